@@ -1,5 +1,7 @@
 """Charts of very large meshes: parts of the surface, seen along an axis, that cover no texel twice."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -37,11 +39,17 @@ def folded() -> Mesh:
     return Mesh(vertices, np.array([[0, 1, 2], [1, 3, 2], [0, 4, 2], [4, 5, 2]]), name="folded")
 
 
-@pytest.mark.parametrize(
-    "mesh", [icosphere(12), embedded("shaderball"), ramp(), folded()], ids=lambda mesh: mesh.name
-)
-def test_no_texel_is_covered_twice_and_no_face_is_missing(mesh):
-    uv, _ = projected_charts(mesh, PACKING)
+MESHES = {mesh.name: mesh for mesh in (icosphere(12), embedded("shaderball"), ramp(), folded())}
+
+
+@cache
+def charts_of(name: str) -> tuple[np.ndarray, np.ndarray]:
+    return projected_charts(MESHES[name], PACKING)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_no_texel_is_covered_twice_and_no_face_is_missing(name):
+    mesh, (uv, _) = MESHES[name], charts_of(name)
     assert usable_uv(mesh, uv)
     seen = np.abs(twice_area(uv))
     whole = mesh.face_areas > 1e-6 * mesh.face_areas.mean()
@@ -49,8 +57,7 @@ def test_no_texel_is_covered_twice_and_no_face_is_missing(mesh):
 
 
 def test_faces_are_shown_in_proportion_to_how_much_they_look_along_their_axis():
-    mesh = icosphere(12)
-    uv, charts = projected_charts(mesh, PACKING)
+    mesh, (uv, charts) = MESHES["icosphere12"], charts_of("icosphere12")
     assert charts.max() == 5
     cosines = np.abs(mesh.face_normals).max(1)
     scale = 0.5 * np.abs(twice_area(uv)) / (mesh.face_areas * cosines)
@@ -59,7 +66,7 @@ def test_faces_are_shown_in_proportion_to_how_much_they_look_along_their_axis():
 
 
 def test_turns_of_a_spiral_are_cut_apart():
-    _, charts = projected_charts(ramp(), PACKING)
+    _, charts = charts_of("ramp")
     assert charts.max() + 1 >= TURNS
 
 

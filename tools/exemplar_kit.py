@@ -11,6 +11,7 @@ from mitex.geometry.vectors import unit
 
 SIZE = 512
 FINE = 1024
+STRIP = 32  # rows that are worked on at once, which stay in the cache
 
 
 @dataclass
@@ -39,20 +40,23 @@ def noise(rng: np.random.Generator, scale: float, roughness: float = 1.0, stretc
         roughness: exponent of the spectrum's fall above that size; 0 is white, 1 fractal, 2 smooth.
         stretch: features are this much longer in x than in y.
     """
-    fx = np.fft.fftfreq(FINE, 1 / FINE)[None, :] * np.sqrt(stretch)
+    fx = np.fft.rfftfreq(FINE, 1 / FINE)[None, :] * np.sqrt(stretch)
     fy = np.fft.fftfreq(FINE, 1 / FINE)[:, None] / np.sqrt(stretch)
     f = np.hypot(fx, fy) * scale
-    spectrum = np.fft.fft2(rng.standard_normal((FINE, FINE)))
+    spectrum = np.fft.rfft2(rng.standard_normal((FINE, FINE)))
     spectrum *= (1.0 + f**2) ** (-0.5 * (1.0 + roughness)) * (f > 0)
-    field = np.fft.ifft2(spectrum).real
+    field = np.fft.irfft2(spectrum, (FINE, FINE))
     return field / field.std()
 
 
 def blur(field: np.ndarray, sigma: float) -> np.ndarray:
     """Periodic Gaussian blur, sigma in texture widths."""
-    f = np.fft.fftfreq(FINE, 1 / FINE)
-    transfer = np.exp(-2.0 * (np.pi * sigma * f) ** 2)
-    return np.fft.ifft2(np.fft.fft2(field) * transfer[None, :] * transfer[:, None]).real
+    along, down = (
+        np.exp(-2.0 * (np.pi * sigma * frequencies(FINE, 1 / FINE)) ** 2)
+        for frequencies in (np.fft.rfftfreq, np.fft.fftfreq)
+    )
+    spectrum = np.fft.rfft2(field)
+    return np.fft.irfft2(spectrum * along[None, :] * down[:, None], (FINE, FINE))
 
 
 def sample(field: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -126,14 +130,31 @@ def normals(height: np.ndarray) -> np.ndarray:
 def ambient_occlusion(height: np.ndarray, reach: float = 0.12, directions: int = 16) -> np.ndarray:
     """Cosine-weighted sky visibility in [0, 1], from the horizon within `reach` texture widths."""
     steps = np.unique(np.geomspace(1, reach * FINE, 14).round())
-    total = np.zeros_like(height)
+    margin = int(steps[-1])
+    around = np.pad(height, margin, mode="wrap")
+    strips = [
+        _visibility(around[top : top + STRIP + 2 * margin], margin, steps, directions)
+        for top in range(0, len(height), STRIP)
+    ]
+    return np.concatenate(strips)
+
+
+def _visibility(around: np.ndarray, margin: int, steps: np.ndarray, directions: int) -> np.ndarray:
+    """`ambient_occlusion` of a strip of heights, given with a margin around it."""
+    rows, columns = (side - 2 * margin for side in around.shape)
+    here = around[margin : margin + rows, margin : margin + columns]
+    total, rise = np.zeros_like(here), np.empty_like(here)
     for angle in np.arange(directions) * (2.0 * np.pi / directions):
-        slope = np.zeros_like(height)
+        slope = np.zeros_like(here)
         for s in steps:
             j, i = round(s * np.cos(angle)), round(s * np.sin(angle))
             run = np.hypot(i, j) / FINE
             fade = 1.0 - (s / steps[-1]) ** 2  # far walls count less, so that no ring shows at the reach
-            slope = np.maximum(slope, fade * (np.roll(height, (-i, -j), (0, 1)) - height) / run)
+            there = around[margin + i : margin + i + rows, margin + j : margin + j + columns]
+            np.subtract(there, here, out=rise)
+            rise *= fade
+            rise /= run
+            np.maximum(slope, rise, out=slope)
         total += slope**2 / (1.0 + slope**2)
     return 1.0 - total / directions
 

@@ -1,5 +1,6 @@
 """GLB: what other programs read, by the specification, by trimesh and by the Khronos validator."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,7 @@ def recomputed(glb: Glb, folder: Path) -> tuple[np.ndarray, np.ndarray]:
     return mikktspace(*corners, np.stack([uv[..., 0], 1.0 - uv[..., 1]], axis=2), folder)
 
 
+@cache
 def coarse() -> Asset:
     """Normals turn by 30 degrees from vertex to vertex, and tangents by more."""
     return wavy(icosphere(2)).baked(512)
@@ -182,6 +184,11 @@ def test_unused_vertices_are_left_out(tmp_path):
     np.testing.assert_array_equal(loaded.mesh.faces, mesh.faces)
 
 
+@cache
+def _valid() -> bytes:
+    return glb_bytes(wavy(icosphere(2)).baked(64))
+
+
 def _patched(data: bytes, old: bytes, new: bytes) -> bytes:
     assert old in data and len(old) == len(new)
     return data.replace(old, new)
@@ -203,7 +210,7 @@ def _patched(data: bytes, old: bytes, new: bytes) -> bytes:
 )
 def test_damaged_files(damage, tmp_path):
     path = tmp_path / "a.glb"
-    path.write_bytes(damage(glb_bytes(wavy(icosphere(2)).baked(64))))
+    path.write_bytes(damage(_valid()))
     with pytest.raises(MeshError, match=r"a\.glb"):
         Asset.load(path)
 

@@ -12,7 +12,7 @@ from mitex.scenes.geometry_renderer import GeometryRenderer
 
 @pytest.fixture(scope="module")
 def renderer():
-    return GeometryRenderer(icosphere(8), orbit(2, resolution=32), samples=1024, gradient_samples=1024)
+    return GeometryRenderer(icosphere(8), orbit(2, resolution=32), samples=1024, gradient_samples=256)
 
 
 def weighted(images: torch.Tensor) -> torch.Tensor:

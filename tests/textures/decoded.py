@@ -27,7 +27,7 @@ UNEVEN = scattered_sphere(60)
 
 
 def random_look(interpolation: Kind = "smooth", coordinates: tuple[str, ...] = (), seed: int = 0) -> Look:
-    config = NcaConfig(interpolation=interpolation, coordinates=coordinates, decoder_width=16)
+    config = NcaConfig(interpolation=interpolation, coordinates=coordinates, decoder_width=8)
     look = Look.of(config, MAPS)
     look.initialise(torch.Generator().manual_seed(seed), 0.5)
     return look

@@ -41,7 +41,11 @@ def capture(folder) -> Capture:
 
 @pytest.fixture(scope="module")
 def shape(script):
-    return script.KINDS[QUICK](np.random.default_rng([0, script.SEEDS[QUICK]]))
+    return made(script, QUICK)
+
+
+def made(script, name):
+    return script.KINDS[name](np.random.default_rng([0, script.SEEDS[name]]))
 
 
 def truth(folder, view):
@@ -139,8 +143,8 @@ def test_unknown_names_are_refused(script, monkeypatch, capsys):
 @pytest.mark.parametrize(
     "name", [QUICK, *(pytest.param(n, marks=pytest.mark.slow) for n in ("durian", "grass", "cobbles"))]
 )
-def test_geometry(script, name):
-    base, part = script.KINDS[name](np.random.default_rng([0, script.SEEDS[name]]))
+def test_geometry(script, shape, name):
+    base, part = shape if name == QUICK else made(script, name)
     assert np.isfinite(part.mesh.vertices).all() and np.isfinite(part.mesh.normals).all()
     assert part.mesh.face_areas.min() > 0
     assert part.colours.shape == part.mesh.vertices.shape

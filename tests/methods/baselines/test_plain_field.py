@@ -27,7 +27,7 @@ from tests.methods.nerf.tiny import tiny_capture
 init()
 SLOW, PACE = np.full(800, 0.2), np.full(200, 0.1)  # seconds of the steps of a probe
 SMALL = ["rays=1024", "ray_steps=192", "table=13", "occupancy=48", "average=0.5", "preview_every=0"]
-STEPS = 120
+STEPS = 90
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_the_presets_are_those_of_the_texture():
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory):
-    """A run for twelve seconds, which a probe of three steps took for those that 120 steps need."""
+    """A run for twelve seconds, which a probe of three steps took for those that 90 steps need."""
     folder = tmp_path_factory.mktemp("plain") / "run"
     calls = []
 

@@ -61,6 +61,12 @@ def generator() -> Generator:
     return result
 
 
+@pytest.fixture
+def briefly_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Statistics at the end of a fit come from three slices, not thirty."""
+    monkeypatch.setattr("mitex.methods.baselines.solid_texture.task.SETTLING", 1)
+
+
 def hashed(box: Box, seed: int = 0) -> list[torch.Tensor]:
     return [torch.from_numpy(hashed_noise(b, NOISE, k, seed))[None] for k, b in enumerate(noise_boxes(box))]
 
@@ -266,6 +272,7 @@ class TestTask:
         assert value(seed=3) != plain
 
 
+@pytest.mark.usefixtures("briefly_settled")
 def test_a_flat_colour_is_learned(tmp_path):
     """On slices as they are trained; statistics of so few voxels are too uneven for the whole volume."""
     red = Exemplar({"albedo": np.full((32, 32, 3), (0.8, 0.3, 0.1), np.float32)}, "red")
@@ -277,6 +284,7 @@ def test_a_flat_colour_is_learned(tmp_path):
     np.testing.assert_allclose(slices.mean((0, 1)), (0.8, 0.3, 0.1), atol=0.15)
 
 
+@pytest.mark.usefixtures("briefly_settled")
 def test_the_width_goes_into_the_texture(exemplar):
     """Half as wide, the pattern is on a mesh what one of scale 2 is."""
     wide, narrow = (solid_texture.fit(exemplar, set=SMALL | {"width": w}, steps=1) for w in (0.5, 0.25))
@@ -289,6 +297,7 @@ def test_the_width_goes_into_the_texture(exemplar):
     assert not np.array_equal(albedo(narrow), albedo(wide))
 
 
+@pytest.mark.usefixtures("briefly_settled")
 def test_resuming_changes_nothing(exemplar, tmp_path):
     threads(1)
     solid_texture.fit(exemplar, tmp_path / "whole", set=SMALL, steps=4)

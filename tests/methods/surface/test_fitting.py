@@ -14,7 +14,7 @@ from mitex.errors import CheckpointError, ConfigError, MeshError
 from mitex.exemplar import Exemplar
 from mitex.features.layers import LAYERS, with_poolings
 from mitex.geometry.vectors import unit
-from mitex.mesh import Mesh, embedded, icosphere
+from mitex.mesh import Mesh, icosphere, torus
 from mitex.mesh.fields import vector_field
 from mitex.methods import surface
 from mitex.methods.layout import with_layout
@@ -46,7 +46,7 @@ def losses(folder):
 
 def test_the_loss_falls_and_the_colours_come_near(exemplar, tmp_path):
     colours = Exemplar({"albedo": exemplar.maps["albedo"]})
-    texture = surface.fit(colours, embedded("vase"), tmp_path / "run", set=[*SMALL, "steps=60"])
+    texture = surface.fit(colours, torus(32, 16), tmp_path / "run", set=[*SMALL, "steps=60"])
     loss = losses(tmp_path / "run")
     assert loss[-1] < 0.15 * loss[0]
     pixels = exemplar.maps["albedo"].reshape(-1, 3)
@@ -96,7 +96,7 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path, monkeypatch):
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        settings = [*SMALL, "start=patches"]
+        settings = [*SHALLOW, "start=patches"]
         whole = surface.fit(exemplar, mesh, tmp_path / "whole", set=settings)
         part = [*settings, "steps=6"]
         surface.fit(exemplar, mesh, tmp_path / "part", set=part)
@@ -133,7 +133,7 @@ def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
 
 def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
     colours = Exemplar({"albedo": exemplar.maps["albedo"]})
-    overrides = [*SMALL, "steps=60", "loss=transport", "layers=relu1_1,relu2_1,relu3_1"]
+    overrides = [*SMALL, "steps=30", "loss=transport", "layers=relu1_1,relu2_1,relu3_1"]
     texture = surface.fit(colours, mesh, tmp_path / "run", preset="noise", set=overrides)
     loss = losses(tmp_path / "run")
     assert np.mean(loss[-5:]) < 0.5 * loss[0]
@@ -295,14 +295,14 @@ def test_one_triangle_is_enough(exemplar, tmp_path):
     assert np.isfinite(texture.values).all()
 
 
-@pytest.mark.parametrize("power", [-20, 20])
-def test_size_does_not_matter(mesh, exemplar, tmp_path, power):
+def test_size_does_not_matter(mesh, exemplar):
     """Scaled by a power of two, which changes no digits, the texture is the same but for rounding."""
     threads(1)
-    large = mesh.with_vertices(mesh.vertices * 2.0**power)
-    a, b = (
-        surface.fit(exemplar, m, tmp_path / name, set=[*SMALL, "steps=3"])
-        for name, m in (("a", mesh), ("b", large))
+    one, small, large = (
+        surface.fit(exemplar, mesh.with_vertices(mesh.vertices * 2.0**power), set=[*SMALL, "steps=3"])
+        for power in (0, -20, 20)
     )
-    assert np.array_equal(a.domain.uv, b.domain.uv)
-    assert np.abs(a.values - b.values).max() < 1e-2
+    for other in (small, large):
+        size = np.ptp(other.domain.mesh.vertices)
+        assert np.array_equal(one.domain.uv, other.domain.uv), size
+        assert np.abs(one.values - other.values).max() < 1e-2, size

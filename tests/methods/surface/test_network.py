@@ -1,5 +1,8 @@
 """The surface network against the image network, and its gradients against dense references."""
 
+import math
+from functools import cache
+
 import numpy as np
 import pytest
 import torch
@@ -20,7 +23,8 @@ from mitex.texels import Texels
 from tests.mesh.examples import tangent_frames
 from tests.methods.surface.grids import flat_square, grid_levels
 
-SIDE = 224
+SIDE = 224  # of which two elements of the last layers are out of reach of the border's rule
+SMALL = 128  # of which two elements of the fourth block's are
 MARGIN = {1: 2, 2: 3, 3: 5, 4: 6, 5: 6}  # how far the border's rule reaches into the layers of a block
 
 
@@ -31,28 +35,61 @@ def levels():
 
 @pytest.fixture(scope="module")
 def traced_levels():
+    return traced(SIDE)
+
+
+@pytest.fixture(scope="module")
+def small_traced_levels():
+    return traced(SMALL)
+
+
+def traced(side):
     """The levels of a flat square of triangles whose atlas is the identity."""
     mesh = flat_square(40)
     assert mesh.uv is not None
-    texels = Texels.rasterize(mesh, mesh.uv, SIDE)
+    texels = Texels.rasterize(mesh, mesh.uv, side)
     frames = tangent_frames(mesh, texels.face, texels.barycentric, "fixed")
     return build(Surroundings(texels, GeodesicTracer(mesh), *frames))
 
 
 @pytest.fixture(scope="module")
 def image():
-    generator = torch.Generator().manual_seed(0)
-    return torch.rand(SIDE, SIDE, 3, generator=generator)
+    return random_image(SIDE)
+
+
+@pytest.fixture(scope="module")
+def small_levels():
+    return grid_levels(SMALL)
+
+
+@pytest.fixture(scope="module")
+def small_image():
+    return random_image(SMALL)
+
+
+def random_image(side):
+    return torch.rand(side, side, 3, generator=torch.Generator().manual_seed(0))
 
 
 def as_image(levels, values, layer):
     """(n, C) elements of a layer as an image (h, w, C)."""
-    n = int(layer[4]) - 1
-    width = SIDE >> n
-    row, column = np.divmod(levels.order[:: 4**n], SIDE)
+    n, side = int(layer[4]) - 1, math.isqrt(len(levels.order))
+    width = side >> n
+    row, column = np.divmod(levels.order[:: 4**n], side)
     out = torch.empty(width, width, values.shape[1])
     out[row >> n, column >> n] = values
     return out
+
+
+@pytest.fixture(scope="module")
+def of_image(image):
+    """What the image network makes of the picture, by its settings."""
+
+    @cache
+    def features(pool, normalised):
+        return Vgg16(pool=pool, precision="float32", normalised=normalised).features(image[None], LAYERS)
+
+    return features
 
 
 @pytest.mark.parametrize(
@@ -64,11 +101,11 @@ def as_image(levels, values, layer):
         ("traced_levels", "average", False),
     ],
 )
-def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, pool, normalised):
+def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, of_image, pool, normalised):
     levels = request.getfixturevalue(kind)
     ours = SurfaceVgg(levels, pool=pool, precision="float32", normalised=normalised)
     features = ours.features(image.view(-1, 3)[levels.order], LAYERS)
-    expected = Vgg16(pool=pool, precision="float32", normalised=normalised).features(image[None], LAYERS)
+    expected = of_image(pool, normalised)
     for layer in LAYERS:
         inner = slice(MARGIN[int(layer[4])], -MARGIN[int(layer[4])])
         a = as_image(levels, features[layer], layer)[inner, inner]
@@ -76,15 +113,15 @@ def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, po
         assert b.numel() and (a - b).abs().max() < 1e-4 * b.abs().max(), layer
 
 
-@pytest.mark.parametrize("kind", ["levels", "traced_levels"])
-def test_input_gradient_equals_the_image_networks(request, kind, image):
+@pytest.mark.parametrize("kind", ["small_levels", "small_traced_levels"])
+def test_input_gradient_equals_the_image_networks(request, kind, small_image):
     """Of the centre of each layer, in float32."""
     levels = request.getfixturevalue(kind)
     ours, theirs = SurfaceVgg(levels, precision="float32"), Vgg16(precision="float32", normalised=False)
     generator = torch.Generator().manual_seed(1)
     for layer in ("relu1_1", "relu1_2", "relu2_2", "relu3_3", "relu4_3"):
-        texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
-        picture = image[None].clone().requires_grad_()
+        texels = small_image.view(-1, 3)[levels.order].clone().requires_grad_()
+        picture = small_image[None].clone().requires_grad_()
         a = as_image(levels, ours.features(texels, [layer])[layer], layer)
         b = theirs.features(picture, [layer])[layer][0]
         centre = slice(len(b) // 2 - 1, len(b) // 2 + 1)
@@ -143,11 +180,11 @@ def test_pooling_against_loops(irregular, kind):
 
 
 @pytest.mark.parametrize("regions", [1, 7])
-def test_gram_matrices_and_their_gradient(levels, image, regions):
+def test_gram_matrices_and_their_gradient(small_levels, small_image, regions):
     """Against those of the features, in float32; all layers together."""
-    ours = SurfaceVgg(levels, precision="float32")
+    ours = SurfaceVgg(small_levels, precision="float32")
     names = ("relu1_1", "pool1", "relu2_2", "relu3_1")
-    texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
+    texels = small_image.view(-1, 3)[small_levels.order].clone().requires_grad_()
     parts = {name: None if regions == 1 else ours.regions(name, regions) for name in names}
     grams = ours.read(texels, {name: GramTap(ours.index_of(name), parts[name]) for name in names})
     features = ours.features(texels, names)
@@ -186,12 +223,12 @@ def test_finite_differences(levels, image):
     assert abs(measured - (gradient * direction).sum()) < 1e-2 * abs(measured)
 
 
-def test_bfloat16_agrees(levels, image):
-    texels = image.view(-1, 3)[levels.order]
+def test_bfloat16_agrees(small_levels, small_image):
+    texels = small_image.view(-1, 3)[small_levels.order]
     results = []
     for precision in ("float32", "bfloat16"):
         x = texels.clone().requires_grad_()
-        network = SurfaceVgg(levels, precision=precision)
+        network = SurfaceVgg(small_levels, precision=precision)
         grams = _grams(network, x, ("relu1_2", "relu2_2", "relu3_3"))
         loss = torch.stack([gram.square().mean() for gram in grams.values()]).sum()
         results.append((grams, torch.autograd.grad(loss, x)[0]))
@@ -201,22 +238,22 @@ def test_bfloat16_agrees(levels, image):
     assert torch.cosine_similarity(gradient.flatten(), close.flatten(), dim=0) > 0.999
 
 
-def test_an_unknown_precision_is_refused(levels):
+def test_an_unknown_precision_is_refused(small_levels):
     with pytest.raises(ConfigError, match="unknown precision 'float16'"):
-        SurfaceVgg(levels, precision="float16")
+        SurfaceVgg(small_levels, precision="float16")
 
 
-def test_random_weights_are_used_as_they_are(levels, image):
+def test_random_weights_are_used_as_they_are(small_levels, small_image):
     """Features are those of the image network with the same weights, and not the trained ones."""
-    weights = random_weights(torch.Generator().manual_seed(0))
-    features = SurfaceVgg(levels, precision="float32", weights=weights).features(
-        image.view(-1, 3)[levels.order], ["relu2_1"]
+    weights, picture = random_weights(torch.Generator().manual_seed(0)), small_image[None]
+    features = SurfaceVgg(small_levels, precision="float32", weights=weights).features(
+        small_image.view(-1, 3)[small_levels.order], ["relu2_1"]
     )
-    expected = Vgg16(precision="float32", weights=weights).features(image[None], ["relu2_1"])["relu2_1"][0]
+    expected = Vgg16(precision="float32", weights=weights).features(picture, ["relu2_1"])["relu2_1"][0]
     inner = slice(MARGIN[2], -MARGIN[2])
-    a, b = as_image(levels, features["relu2_1"], "relu2_1")[inner, inner], expected[inner, inner]
+    a, b = as_image(small_levels, features["relu2_1"], "relu2_1")[inner, inner], expected[inner, inner]
     assert (a - b).abs().max() < 1e-4 * b.abs().max()
-    trained = Vgg16(precision="float32", normalised=False).features(image[None], ["relu2_1"])["relu2_1"][0]
+    trained = Vgg16(precision="float32", normalised=False).features(picture, ["relu2_1"])["relu2_1"][0]
     assert (trained[inner, inner] - b).norm() > 0.5 * b.norm()
 
 
@@ -228,9 +265,9 @@ def test_random_weights_are_those_of_he():
         assert abs(float(weight.std()) / deviation - 1) < 0.05 and abs(float(weight.mean())) < 0.1 * deviation
 
 
-def test_wrong_input_is_refused(levels, image):
-    ours = SurfaceVgg(levels)
+def test_wrong_input_is_refused(small_levels, small_image):
+    ours = SurfaceVgg(small_levels)
     with pytest.raises(ConfigError, match="relu9_9"):
-        ours.features(image.view(-1, 3), ["relu9_9"])
+        ours.features(small_image.view(-1, 3), ["relu9_9"])
     with pytest.raises(ConfigError, match="shape"):
-        ours.features(image, ["relu1_1"])
+        ours.features(small_image, ["relu1_1"])

@@ -9,7 +9,7 @@ import pytest
 from mitex.errors import ConfigError, ImageError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
-from mitex.mesh import embedded
+from mitex.mesh import torus
 from mitex.methods import surface
 from mitex.methods.baselines import multi_view_gram
 from mitex.methods.surface.content import content_colours, content_picture
@@ -25,12 +25,12 @@ class TestStyleTransfer:
 
     def test_ambient_occlusion_keeps_its_structure(self, exemplar, tmp_path):
         """The result still follows the content, in the exemplar's colours."""
-        mesh = embedded("mushrooms")
+        mesh = torus(32, 16)
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
         texture = surface.fit(image, mesh, tmp_path / "run", content="ao", set=self.STYLE)
         content = content_colours(None, texture.domain)
         assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
-        assert np.corrcoef(content.mean(1), texture.values.mean(1))[0, 1] > 0.3
+        assert np.corrcoef(content.mean(1), texture.values.mean(1))[0, 1] > 0.35
         assert np.abs(texture.values - content).mean() > 0.02
 
     def test_without_style_nothing_changes(self, mesh, exemplar, tmp_path):
