@@ -1,11 +1,11 @@
 """Grows reliefs on a mesh like one that was scanned: of four times as many faces, rough, and with a hole.
 
-usage: python tools/make_scan_sheet.py MESH [MODEL ...]
+usage: python tools/make_scan_sheet.py MESH [MODEL[=VERTICES] ...]
 
 MESH is split once, its vertices are moved by `ROUGHNESS` edges, and it is cut open at the bottom. Each MODEL
-(default: spikes, scales) grows on it, remeshed to `VERTICES`, as it is and with the option `untangle`. Writes
-docs/gallery/geometric-scan.jpg, and prints how many faces, edges at borders and piercing pairs there are, and
-the seconds.
+(default: `MODELS`) grows on it, remeshed to so many VERTICES (or 2,000), as it is and with the option
+`untangle`. Writes docs/gallery/geometric-scan.jpg, and prints how many faces, edges at borders and piercing
+pairs there are, and the seconds.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 300  # side of a picture [px]
 ROUGHNESS = 0.15  # standard deviation of the noise along each axis [mean edges]
 CUT = 0.03  # share of the vertices below which faces are taken away
-VERTICES = 2_000
+VERTICES = "2000"
+MODELS = ("spikes", "scales=16000")  # that of the scales adds no vertices
 
 
 def scan_like(mesh: Mesh) -> Mesh:
@@ -65,9 +66,10 @@ def reported(label: str, make: Callable[..., Mesh], *arguments: object) -> Mesh:
 def main() -> None:
     path, *names = sys.argv[1:]
     scan = reported("scan", scan_like, Mesh.load(path))
-    even = reported("remeshed", remesh, scan, VERTICES)
     results, labels = [scan], ["a rough mesh, cut open"]
-    for name in names or ("spikes", "scales"):
+    for word in names or MODELS:
+        name, _, vertices = word.partition("=")
+        even = reported("remeshed", remesh, scan, int(vertices or VERTICES))
         texture = GeometricTexture.load(name)
         for untangle, label in ((False, name), (True, f"{name}, untangled")):
             results.append(reported(label, grown, texture, even, untangle))
