@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +142,24 @@ def few_patches(patch: pytest.MonkeyPatch) -> None:
 def coarse_grids(patch: pytest.MonkeyPatch) -> None:
     """What is solid in boxes on a mesh is looked for on a grid of an eighth of the cells."""
     patch.setattr("mitex.methods.baselines.nerf_tex.boxes.CELLS", 32)
+
+
+def small_coarse_fields(patch: pytest.MonkeyPatch) -> None:
+    """The coarse fields that base meshes get their shells from are as small as the fits, and scanned less."""
+    from mitex.methods.nerf.base import coarse
+
+    small = replace(coarse.COARSE, rays=512, table=11, occupancy=32, ray_steps=96)
+    patch.setattr(coarse, "COARSE", small)
+    patch.setattr(coarse, "VIEWS", 4)
+
+
+def rough_surfaces(patch: pytest.MonkeyPatch) -> None:
+    """The maps that reliefs begin with are synthesized from noise, by the features of one layer."""
+    from mitex.methods.relief.config import ReliefConfig
+
+    given = ReliefConfig.of_surface
+    rough = {"start": "noise", "scales": 0, "layers": ("relu1_1",)}
+    patch.setattr(ReliefConfig, "of_surface", property(lambda config: given.__get__(config) | rough))
 
 
 def untrained_bases(patch: pytest.MonkeyPatch) -> None:

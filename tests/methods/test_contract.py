@@ -28,12 +28,12 @@ from mitex.methods.registry import load, method_of, methods
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import NAME
 from mitex.training.settings import FitConfig, meaning
-from tests.methods.fits import FITS, coarse_grids, few_patches, prepare
+from tests.methods.fits import FITS, coarse_grids, few_patches, prepare, rough_surfaces, small_coarse_fields
 from tests.state import in_thread, program_state
 
 SIDE = 48  # of pictures [pixels]
 TOY = Path(__file__).parents[1] / "toy"
-pytestmark = pytest.mark.usefixtures("own_cache", "toy", "quick_settling")
+pytestmark = pytest.mark.usefixtures("own_cache", "toy", "quick_settling", "quick_beginnings", "known_hulls")
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +47,15 @@ def toy():
 
 
 @pytest.fixture(scope="module")
+def quick_beginnings():
+    """What fits begin with is made by other fits, which have settings of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        small_coarse_fields(patch)
+        rough_surfaces(patch)
+        yield
+
+
+@pytest.fixture(scope="module")
 def workplace(tmp_path_factory):
     folder = tmp_path_factory.mktemp("contract")
     prepare(folder)
@@ -54,7 +63,7 @@ def workplace(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def runs(workplace, toy, own_cache):
+def runs(workplace, toy, own_cache, quick_beginnings):
     """Run folders of tiny fits, made when they are asked for."""
     folders = {}
 

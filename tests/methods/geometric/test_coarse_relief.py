@@ -1,5 +1,7 @@
 """The coarse part of a relief: what of it is taken, and what is laid like it."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -11,9 +13,11 @@ from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere, torus
 from mitex.mesh.fields import vector_field
 from mitex.mesh.low_pass import blurred
-from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief, split
+from mitex.methods.geometric import coarse_relief
+from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief
 
 BALL = icosphere(16)
+split = cache(coarse_relief.split)  # of the meshes below, which are made once
 EDGE = float(BALL.edge_lengths.mean())
 TORUS = torus(64, 28, tube=0.45)
 
@@ -21,7 +25,7 @@ TORUS = torus(64, 28, tube=0.45)
 @pytest.fixture(autouse=True)
 def few_patches(monkeypatch):
     """Which take seconds."""
-    monkeypatch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 100)
+    monkeypatch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 50)
 
 
 def with_heights(heights: np.ndarray) -> Mesh:
@@ -36,12 +40,14 @@ def middles(count: int) -> np.ndarray:
     return np.stack([ring * np.sin(angle), y, ring * np.cos(angle)], 1)
 
 
+@cache
 def bumps(side: float, count: int = 40, width: float = 3.0) -> Mesh:
     """Round ones around points that are evenly spread, one edge high and so many wide."""
     away, _ = KDTree(middles(count)).query(BALL.vertices)
     return with_heights(side * np.exp(-((away / (0.5 * width * EDGE)) ** 2)))
 
 
+@cache
 def waves(length: float, count: int = 80) -> Mesh:
     """Waves so many edges long, of random directions."""
     rng = np.random.default_rng(1)
@@ -50,6 +56,7 @@ def waves(length: float, count: int = 80) -> Mesh:
     return with_heights(np.cos(BALL.vertices @ ways.T + phases).sum(1) / np.sqrt(0.5 * count))
 
 
+@cache
 def stripes(length: float) -> Mesh:
     """Circles of latitude, so many edges from one to the next."""
     return with_heights(np.cos(2 * np.pi / (length * EDGE) * np.arcsin(np.clip(BALL.vertices[:, 1], -1, 1))))
@@ -184,11 +191,17 @@ def test_stripes_run_on():
     assert shares[0] > 0.8 and shares[0] > shares[1] + 0.1
 
 
+@cache
+def along_up(symmetric: bool) -> CoarseRelief:
+    """The relief of circles of latitude, which follow `up`."""
+    whole = split(stripes(8))
+    return CoarseRelief(whole.base, whole.heights, vector_field(whole.base, "up"), symmetric)
+
+
 @pytest.mark.parametrize("name", ["about-y", "up"])
 def test_a_relief_follows_its_field(name):
     """Of the slopes of circles of latitude, which follow `up`, most are along the field that is given."""
-    whole = split(stripes(8))
-    coarse = CoarseRelief(whole.base, whole.heights, vector_field(whole.base, "up"), symmetric=True)
+    coarse = along_up(symmetric=True)
     field = vector_field(TORUS, name)
     heights = ((coarse.on(TORUS, field)(0) - TORUS.vertices) * TORUS.normals).sum(1)
     steep = slopes(TORUS, heights)
@@ -200,9 +213,7 @@ def test_a_relief_follows_its_field(name):
 
 
 def test_patches_lie_both_ways_if_ends_look_alike():
-    whole = split(stripes(8))
-    field = vector_field(whole.base, "up")
-    one, both = (CoarseRelief(whole.base, whole.heights, field, ends).patches for ends in (False, True))
+    one, both = (along_up(symmetric).patches for symmetric in (False, True))
     assert len(both.values) == 2 * len(one.values)
 
 

@@ -22,6 +22,15 @@ FINE = [*SMALL, "first_level=2", "fit_blur=1", "steps=6"]
 MESH = icosphere(5)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def few_coarse_reliefs():
+    """A training starts from few of them, which are quilted from few patches: all of them take seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitex.methods.geometric.fitting.LAID", 3)
+        patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 60)
+        yield
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     threads(1)  # whose number changes the last digits

@@ -55,10 +55,15 @@ CASES = {
 
 
 def learned(field: str | None = "up", **settings: object) -> list[torch.Tensor]:
-    """The weights after a short fit, without reports on its training meshes, which take twice as long."""
+    """The weights after a short fit, without what takes longer: reports on its training meshes, and many
+    coarse reliefs to start from."""
     words = [f"{key}={value}" for key, value in (BASE | settings).items()]
     threads(1)
-    with patch("mitex.methods.geometric.fitting.report", lambda *_: SimpleNamespace()):
+    with (
+        patch("mitex.methods.geometric.fitting.report", lambda *_: SimpleNamespace()),
+        patch("mitex.methods.geometric.fitting.LAID", 2),
+        patch("mitex.methods.geometric.coarse_relief.PLACES", 60),
+    ):
         texture = geometric.fit(icosphere(4), field=field, set=words)
     return [p.detach() for generator in texture.generators for p in generator.parameters]
 
