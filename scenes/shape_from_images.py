@@ -35,8 +35,10 @@ def smoother(mesh: Mesh) -> Callable[[np.ndarray], np.ndarray]:
     return lambda gradient: np.stack([solve(gradient[:, k]) for k in range(3)], 1)
 
 
-def main(out: str = "shape.png", steps: int = 60, resolution: int = 64, spp: int = 64) -> list[float]:
-    """Returns the loss of each step."""
+def main(
+    out: str = "shape.png", steps: int = 60, resolution: int = 64, spp: int = 64, side: int = 384
+) -> list[float]:
+    """Returns the loss of each step; the shapes are shown in `side` x `side` pixels each."""
     ball = icosphere(16)
     bumps = 1 + 0.12 * np.sin(5 * ball.vertices).prod(1, keepdims=True)
     wanted = ball.with_vertices(ball.vertices * bumps)
@@ -54,7 +56,7 @@ def main(out: str = "shape.png", steps: int = 60, resolution: int = 64, spp: int
         optimizer.step(0.01 * 0.1 ** (step / steps))
         losses.append(loss.item())
     shown = (wanted.vertices, ball.vertices, vertices.detach().numpy())
-    print(write_image(out, np.hstack([portrait(v, ball.faces, 384, spp) for v in shown])))
+    print(write_image(out, np.hstack([portrait(v, ball.faces, side, spp) for v in shown])))
     return losses
 
 

@@ -10,11 +10,14 @@ from mitex.mesh import icosphere
 
 @pytest.fixture(scope="module")
 def tab(browser, tmp_path_factory):
+    """The page, whose reliefs are laid from patches of few places."""
     folder = tmp_path_factory.mktemp("gallery")
     mesh = folder / "ball.ply"
     mesh.write_bytes(ball())
     out = folder / "gallery.html"
-    assert main(["gallery", "--mesh", str(mesh), "--out", str(out), "--quiet"]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 20)
+        assert main(["gallery", "--mesh", str(mesh), "--out", str(out), "--quiet"]) == 0
     assert out.stat().st_size < 3_000_000
     return browser.open(out, 96)
 

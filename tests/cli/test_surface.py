@@ -24,6 +24,7 @@ from tests.shapes import moebius
 pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = "--quiet --set resolution=32 exemplar_size=32 steps=4 checkpoint_every=2 preview_every=0 scales=0"
 QUICK = f"{SMALL} start=noise"
+FEW_TEXELS = SMALL.replace("resolution=32", "resolution=16")
 
 
 def fit(words=QUICK, exemplar="good.png", mesh="good.obj", out="out/run"):
@@ -193,7 +194,7 @@ HARD = {
 def test_hard_meshes_get_a_texture(files, name, capsys):
     bad.image(files / "good.png")
     bad.text(files / "hard.obj", HARD[name])
-    assert main(fit(SMALL, mesh="hard.obj")) == 0
+    assert main(fit(FEW_TEXELS, mesh="hard.obj")) == 0
     assert main(["apply", "out/run", "--mesh", "hard.obj", "--out", "out/a.glb"]) == 0
     output = capsys.readouterr()
     assert all(line.startswith("warning: ") for line in output.err.splitlines())
@@ -208,6 +209,6 @@ def test_a_moebius_strip(files, capsys):
     strip = moebius()
     trimesh.Trimesh(strip.vertices, strip.faces, process=False).export(files / "strip.obj")
     bad.image(files / "good.png")
-    assert main(fit(SMALL, mesh="strip.obj")) == 0
+    assert main(fit(FEW_TEXELS, mesh="strip.obj")) == 0
     assert main(["apply", "out/run", "--mesh", "strip.obj", "--out", "out/a.glb"]) == 0
     assert "opposite winding" in capsys.readouterr().err

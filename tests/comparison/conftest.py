@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,9 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import NerfTexture
 from tests.batch.in_this_process import InThisProcess
 from tests.cli import bad_files as bad
+from tests.cli.test_nerf import holed, save
+from tests.methods.fits import few_patches, untrained_bases
+from tests.methods.nerf.capture.ellipsoid import write
 
 
 @pytest.fixture
@@ -65,6 +69,17 @@ def planes_alike(monkeypatch: pytest.MonkeyPatch) -> None:
 def grey(monkeypatch: pytest.MonkeyPatch) -> None:
     """Jobs learn nothing and write grey meshes."""
     monkeypatch.setattr("mitex.batch.task.Process", Grey)
+
+
+def small_capture(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    """Photos of 8 views, of which one is held out, and a coarse base.obj, which is taken as it is; what is
+    solid is looked for on the grid of cells that rays see, and few patches are laid."""
+    write(folder / "photos", 8)
+    save(holed(30), folder / "base.obj")
+    patch.setattr("mitex.methods.nerf.base.base_shape.FINE", math.inf)
+    patch.setattr("mitex.methods.nerf.use.extract.CELLS", 1)
+    untrained_bases(patch)
+    few_patches(patch)
 
 
 def words_plan(words: Sequence[str], names: Sequence[str] = ("nca", "x_mesh")) -> Plan:

@@ -16,8 +16,8 @@ from mitex.comparison.presets import presets
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from tests.cli import bad_files as bad
-from tests.comparison.conftest import write_mesh
-from tests.methods.fits import FITS, coarse_grids, few_patches, prepare, untrained_bases
+from tests.comparison.conftest import small_capture, write_mesh
+from tests.methods.fits import FITS, coarse_grids
 from tests.methods.nca.text.tiny_text import SETTINGS as TEXT_SETTINGS
 
 CONTENT = {
@@ -32,11 +32,11 @@ CONTENT = {
 }
 WORDS = "resolution=32 view=32 width=8 frequencies=4 views=1 text_vertices=50 preview_every=0 steps=2"
 SETTINGS = {  # beside those of the tiny fits
-    "nca text": " ".join((*TEXT_SETTINGS, "clip=words", "steps=2", "apply.resolution=64")),
+    "nca text": " ".join((*TEXT_SETTINGS, "clip=words", "steps=2", "apply.resolution=64 apply.subdivide=0")),
     "text2mesh text": WORDS,
     "x_mesh text": WORDS,
     "geometric": "apply.start_level=0 apply.remesh=100",
-    "nca": "apply.resolution=64 apply.steps=2",
+    "nca": "apply.resolution=64 apply.steps=2 apply.subdivide=0",
     "reaction_diffusion": "apply.resolution=64 apply.steps=2",
     "solid_texture": "apply.resolution=64",
     "gatys": "apply.resolution=64",
@@ -151,16 +151,16 @@ def test_a_preset_of_few_steps(name, place, monkeypatch):
 
 def files(place, monkeypatch):
     """What the presets name and does not ship with Mitex; a small ball stands in for meshes that do."""
-    prepare(place)
+    small_capture(place, monkeypatch)
     (place / "captures").mkdir()
     (place / "photos").rename(place / "captures" / "durian")
     (place / "exemplars" / "Waffle_001").mkdir(parents=True)
     bad.image(place / "exemplars" / "Waffle_001" / "albedo.png", (96, 96))
     (place / "meshes").mkdir()
     write_mesh(place / "meshes" / "spot.obj")
-    few_patches(monkeypatch)
     coarse_grids(monkeypatch)
-    untrained_bases(monkeypatch)
+    monkeypatch.setattr("mitex.methods.geometric.references.FREQUENCY", 12)
+    monkeypatch.setattr("mitex.methods.geometric.report.SAMPLES", 500)
     load = import_module("mitex.mesh.load")
     monkeypatch.setattr(load, "embedded", lambda name: replace(icosphere(6), name=name))
 

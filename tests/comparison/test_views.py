@@ -16,7 +16,8 @@ from mitex.images import read_image
 from mitex.methods.baselines.plain_field import PlainFieldTexture
 from mitex.methods.nerf.capture.capture import load_capture
 from mitex.methods.nerf.field.rendering import render_view, render_views
-from tests.methods.fits import few_patches, prepare, untrained_bases
+from tests.cli import bad_files as bad
+from tests.comparison.conftest import small_capture
 
 COMMON = ["rays=512", "table=11", "occupancy=32", "ray_steps=96", "steps=2", "preview_every=0"]
 BASE = ["base_mesh=base.obj", "base_steps=150", "coarsest=8", "finest=32"]
@@ -25,14 +26,12 @@ OF_PLAIN = {"psnr", "ssim", "vgg", "parameters", "fit_seconds", "memory"}
 
 
 @pytest.fixture
-def compared(small, planes_alike, own_cache, tmp_path, monkeypatch):
+def compared(small, planes_alike, own_cache, place, monkeypatch):
     """The folder of a comparison of both on two meshes, in which all planes are alike."""
-    prepare(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    few_patches(monkeypatch)
-    untrained_bases(monkeypatch)
+    bad.text(place / "cube.obj", bad.CUBE)
+    small_capture(place, monkeypatch)
     compare()
-    return tmp_path / "out"
+    return place / "out"
 
 
 def compare():

@@ -5,22 +5,23 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
 - meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
-- `--remesh` gives 600 vertices at most;
+- `--remesh` gives 200 vertices at most, and the gallery's rings have 60;
 - reliefs that begin on a finer level begin on 320 faces, and their coarse parts are laid once in a fit, from
-  the patches of 30 places;
+  the patches of 10 places; training meshes are measured at 500 points;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
   of baselines are;
-- films have 4 frames of 32 pixels, of automata on the mesh as it is;
+- films have 4 frames of 32 pixels, of automata on the mesh as it is, as wide as pictures in pages are;
 - the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
   joined from 30 patches to 128 texels;
 - pictures are traced in 16 x 16 pixels with one path each, and enlarged;
-- jobs of a batch run in this process, and comparisons look at one patch.
+- jobs of a batch run in this process, comparisons look at one patch, and words are judged by one view.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,8 @@ from tests.methods.nerf.tiny import tiny_capture, write_capture
 STEPS, RESUMED_STEPS = 2, 3
 GROWTH = 2  # steps of an automaton
 FIRST_LEVEL = 2  # of reliefs that begin on a finer level
-REMESHED = 600  # vertices
+REMESHED = 200  # vertices
+RING = (10, 6)  # vertices around and across
 TEXELS = 64
 SIDE = 16  # of a picture [pixels]
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
@@ -109,11 +111,12 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     from mitex.training import fit
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
-    patch.setattr("mitex.mesh.load.embedded", lambda name: _ball_in_place_of(embedded(name)))
+    patch.setattr("mitex.mesh.load.embedded", _ball_in_place_of)
     patch.setattr("mitex.mesh.remesh", lambda mesh, vertices: remesh(mesh, min(vertices, REMESHED)))
     few_steps = _with_few_growth_steps(texture.grown_state)
     for module in (texture, page):
         patch.setattr(module, "grown_state", few_steps)
+    patch.setattr(page, "PICTURE", 32)
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
@@ -125,10 +128,14 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("mitex.batch.task.Process", InThisProcess)
     for name in ("PATCHES", "WINDOWS"):
         patch.setattr(f"mitex.comparison.look_pair.{name}", 1)
+    patch.setattr("mitex.render.sides.AZIMUTHS", (0,))
+    patch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr("mitex.methods.geometric.references.FREQUENCY", 12)
     patch.setattr("mitex.methods.geometric.fitting.LAID", 1)
-    patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 30)
+    patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 10)
+    patch.setattr("mitex.methods.geometric.report.SAMPLES", 500)
+    patch.setattr("mitex.methods.geometric.example.RINGS", (RING,))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
     patch.setattr(NerfTexture, "synthesize_on", _small_quilt_on(NerfTexture.synthesize_on))
@@ -138,7 +145,9 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
         patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
 
 
-def _ball_in_place_of(mesh: Mesh) -> Mesh:
+@cache
+def _ball_in_place_of(name: str) -> Mesh:
+    mesh = embedded(name)
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     ball = icosphere(6)
     return replace(

@@ -137,15 +137,22 @@ def test_text_texture_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_shape_from_images_script(mi, tmp_path: Path):
-    losses = load("shape_from_images").main(str(tmp_path / "shape.png"), steps=6, resolution=24, spp=4)
-    assert read_image(tmp_path / "shape.png").shape == (384, 3 * 384, 3)
+    script = load("shape_from_images")
+    losses = script.main(str(tmp_path / "shape.png"), steps=4, resolution=24, spp=1, side=32)
+    assert read_image(tmp_path / "shape.png").shape == (32, 3 * 32, 3)
     assert losses[-1] < 0.8 * losses[0]
 
 
-def test_relief_and_colour(tmp_path: Path):
+def test_relief_and_colour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Grey with the light's hue only on the left, in the pebbles' pale colours on the right."""
     pytest.importorskip("pymeshlab")
-    load("relief_and_colour").main(str(tmp_path / "a.png"), vertices=60, resolution=48, spp=8)
+    quick = partialmethod(NcaTexture.apply, steps=40, subdivide=0, resolution=128)
+    monkeypatch.setattr(NcaTexture, "apply", quick)
+    monkeypatch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 20)
+    script, ball = load("relief_and_colour"), icosphere(8)
+    flat = ball.with_vertices(ball.vertices * np.array([1.0, 0.6, 1.0]))
+    monkeypatch.setattr(script, "embedded", lambda _name: flat)
+    script.main(str(tmp_path / "a.png"), vertices=60, resolution=48, spp=8)
     picture = read_image(tmp_path / "a.png")
     half = picture.shape[1] // 2
     grey, coloured = picture[:, :half], picture[:, -half:]

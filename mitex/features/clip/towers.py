@@ -82,7 +82,7 @@ class ImageEmbeddings(nn.Module):
         width, places = shape.image.width, (shape.resolution // shape.patch) ** 2 + 1
         self.class_embedding = nn.Parameter(torch.zeros(width))
         self.patch_embedding = nn.Conv2d(3, width, shape.patch, shape.patch, bias=False)
-        self.position_embedding = nn.Embedding(places, width)
+        self.position_embedding = _table(places, width)
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         patches = self.patch_embedding(images).flatten(2).transpose(1, 2)
@@ -112,8 +112,8 @@ class TextEmbeddings(nn.Module):
 
     def __init__(self, shape: ClipShape) -> None:
         super().__init__()
-        self.token_embedding = nn.Embedding(shape.vocabulary, shape.text.width)
-        self.position_embedding = nn.Embedding(shape.length, shape.text.width)
+        self.token_embedding = _table(shape.vocabulary, shape.text.width)
+        self.position_embedding = _table(shape.length, shape.text.width)
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
         return self.token_embedding(tokens) + self.position_embedding.weight[: tokens.shape[1]]
@@ -142,3 +142,8 @@ class Towers(nn.Module):
         self.vision_model, self.text_model = ImageTower(shape), TextTower(shape)
         self.visual_projection = nn.Linear(shape.image.width, shape.embedding, bias=False)
         self.text_projection = nn.Linear(shape.text.width, shape.embedding, bias=False)
+
+
+def _table(count: int, width: int) -> nn.Embedding:
+    """Empty vectors, one a number: to draw them on the device "meta" takes a second of imports."""
+    return nn.Embedding.from_pretrained(torch.empty(count, width), freeze=False)
