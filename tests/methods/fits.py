@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +142,14 @@ def few_patches(patch: pytest.MonkeyPatch) -> None:
 def coarse_grids(patch: pytest.MonkeyPatch) -> None:
     """What is solid in boxes on a mesh is looked for on a grid of an eighth of the cells."""
     patch.setattr("mitex.methods.baselines.nerf_tex.boxes.CELLS", 32)
+
+
+def quick_bases(patch: pytest.MonkeyPatch) -> None:
+    """The coarse field that measures a shell's thickness is small, and scanned in few pixels."""
+    from mitex.methods.nerf.base import coarse
+
+    patch.setattr(coarse, "COARSE", replace(coarse.COARSE, ray_steps=96, table=13))
+    patch.setattr(coarse, "SCAN_SIDE", 80)
 
 
 def untrained_bases(patch: pytest.MonkeyPatch) -> None:

@@ -85,7 +85,7 @@ def test_maps_of_a_mesh_lie_over_its_uvs_once():
 
 
 def test_pictures_of_patches_are_what_is_seen_from_above(texture):
-    patches = texture.patches(np.random.default_rng(0), 20)
+    patches = texture.patches(np.random.default_rng(0), 8)
     whole = render_patches(texture.shell, patches)
     assert whole.shape == (*patches.faces.shape, 3) and whole.min() >= 0 and whole.max() <= 1
     thin = render_patches(texture.shell, patches, every=4)
