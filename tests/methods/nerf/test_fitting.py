@@ -253,8 +253,8 @@ def test_refined_cameras_make_up_for_wrong_ones(base, tmp_path, own_cache):
     poses = capture.poses.copy()
     poses[:, :, :3] = turns.as_matrix() @ poses[:, :, :3]
     wrong = replace(capture, poses=poses.astype(np.float32))
-    more = [s for s in SETTINGS if not s.startswith(("steps", "lr_steps", "preview"))]
-    more += ["steps=400", "lr_steps=400", "preview_every=0"]
+    more = [s for s in SETTINGS if not s.startswith(("steps", "lr", "rays=", "average", "preview"))]
+    more += ["steps=400", "lr_steps=400", "rays=1024", "average=0.5", "preview_every=0"]
     errors = {}
     for name, photos, refined in (("right", capture, 0), ("wrong", wrong, 0), ("refined", wrong, 1)):
         settings = [*more, f"refine_cameras={'true' if refined else 'false'}"]
