@@ -18,19 +18,18 @@ from mitex.scenes.shapes import mesh_shape
 FOV = 40.0
 DISTANCE = 2.2
 SETTINGS = (  # of a small real fit
-    "steps=120",
-    "lr=0.02",
-    "lr_steps=200",
+    "steps=160",
+    "lr_steps=160",
     "base_steps=150",
-    "rays=1536",
+    "rays=1024",
     "ray_steps=192",
     "table=13",
     "coarsest=32",
     "finest=128",
     "occupancy=48",
-    "average=0.1",
-    "preview_every=120",
-    "checkpoint_every=60",
+    "average=0.5",
+    "preview_every=160",
+    "checkpoint_every=80",
 )
 
 
