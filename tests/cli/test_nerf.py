@@ -15,7 +15,7 @@ from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.texture import SIZE
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
-from tests.methods.fits import few_patches
+from tests.methods.fits import few_patches, quick_bases
 from tests.methods.nerf.capture.ellipsoid import CENTRE, RADII, rgba, set_alpha, write
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -42,6 +42,14 @@ def save(mesh, path):
     lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
     bad.text(path, "\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _quick_bases():
+    """For all fits, or the base shape of one would not be that of another."""
+    with pytest.MonkeyPatch.context() as patch:
+        quick_bases(patch)
+        yield
 
 
 @pytest.fixture(scope="module")

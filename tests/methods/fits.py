@@ -162,6 +162,14 @@ def rough_surfaces(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(ReliefConfig, "of_surface", property(lambda config: given.__get__(config) | rough))
 
 
+def quick_bases(patch: pytest.MonkeyPatch) -> None:
+    """The coarse field that measures a shell's thickness is small, and scanned in few pixels."""
+    from mitex.methods.nerf.base import coarse
+
+    patch.setattr(coarse, "COARSE", replace(coarse.COARSE, ray_steps=96, table=13))
+    patch.setattr(coarse, "SCAN_SIDE", 80)
+
+
 def untrained_bases(patch: pytest.MonkeyPatch) -> None:
     """Base meshes get a shell at once, without the training that measures how thick it must be."""
     from mitex.methods.nerf.base.base_shape import given_base

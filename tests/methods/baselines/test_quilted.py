@@ -17,7 +17,7 @@ from mitex.methods.nerf.use.placement import EXTENT
 from mitex.quilting.repetition import EVENNESS
 from tests.methods.nerf.small import small_texture
 
-SMALL = ["size=128", "patches=12"]  # of a small fit
+SMALL = ["size=128", "patches=4"]  # of a small fit
 
 
 def checks(patches: Patches) -> np.ndarray:
@@ -123,7 +123,7 @@ def test_it_is_fitted_to_a_model_file_too(flat: QuiltedTexture, tmp_path):
     ).all()
 
 
-@pytest.mark.parametrize("change", ["size=144", "patches=9", "relit=false", "even=false", "seed=1"])
+@pytest.mark.parametrize("change", ["size=144", "patches=3", "relit=false", "even=false", "seed=1"])
 def test_every_setting_changes_the_picture(flat: QuiltedTexture, tmp_path, change):
     other = fit(captured(), tmp_path / "run", set=[*SMALL, change])
     assert other.image.shape != flat.image.shape or (other.image != flat.image).any()

@@ -264,10 +264,16 @@ def test_refined_cameras_make_up_for_wrong_ones(base, tmp_path, own_cache):
     assert errors["refined"] < 0.5 * (errors["right"] + errors["wrong"]), errors
 
 
-def trained_task(run, base: Mesh, capture, setting: str) -> TextureTask:
+@pytest.fixture(scope="module")
+def projection(base: Mesh) -> Projection:
+    """One for all tasks after the fit: it keeps what it has looked up."""
+    return Projection(base, reach=0.12)
+
+
+def trained_task(run, projection: Projection, capture, setting: str) -> TextureTask:
     """After the small fit, with a setting of its own and the same or other photos."""
     settings = resolve(PRESETS, "fast", overrides=[*SETTINGS, setting])
-    task = TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+    task = TextureTask(settings, capture, (capture, 0), projection, face_frames(projection.mesh), 0.12)
     state = checkpoint.load(run).task
     with torch.no_grad():
         for name, value in task.named.items():
@@ -275,10 +281,10 @@ def trained_task(run, base: Mesh, capture, setting: str) -> TextureTask:
     return task
 
 
-def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, base):
+def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, projection):
     gradients = []
     for weight in (0.0, 1.0):
-        task = trained_task(run, base, tiny_capture(), f"interior_weight={weight}")
+        task = trained_task(run, projection, tiny_capture(), f"interior_weight={weight}")
         result = run_step(task, task.config.steps)
         assert result.metrics.get("interior", 0.0) > 0 or not weight
         gradients.append(torch.autograd.grad(result.value, [task.named["tables/f"], task.named["weights/4"]]))
@@ -288,17 +294,17 @@ def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, bas
     assert (reflection - reflection_too).abs().max() > 0.01 * reflection.abs().max()
 
 
-def test_an_inside_that_looks_as_the_surface_costs_nothing(run, base):
-    task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
+def test_an_inside_that_looks_as_the_surface_costs_nothing(run, projection):
+    task = trained_task(run, projection, tiny_capture(), "interior_weight=1.0")
     with torch.no_grad():
         task.named["weights/4"].zero_()  # the last of the reflection's: all is grey
     assert run_step(task, task.config.steps).metrics["interior"] == 0
     assert "interior" not in run_step(task, 0).metrics
 
 
-def test_buried_is_what_has_matter_above_and_beside_it(run, base):
+def test_buried_is_what_has_matter_above_and_beside_it(run, projection):
     """In matter that ends at the base shape and at x = 0.1: near either of them a photo may see it."""
-    task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
+    task = trained_task(run, projection, tiny_capture(), "interior_weight=1.0")
     reach = BURIED * task.thickness
     x, distance = [0, 0, 0, 0.1 - 0.9 * reach, 0.1 - 1.5 * reach], [0.5, -0.9, -1.1, -1.1, -1.1]
     up = mi.Vector3f(0, 0, mi.Float([1] * 5))
@@ -315,7 +321,7 @@ def test_buried_is_what_has_matter_above_and_beside_it(run, base):
     np.testing.assert_allclose(buried, [0, 0, 1, 0, 1], atol=1e-3)
 
 
-def test_wrong_cameras_find_back(run, base):
+def test_wrong_cameras_find_back(run, projection):
     """In a field that is right, cameras turned by half a degree turn back, or move so that it is the same."""
     capture, rng = tiny_capture(), np.random.default_rng(0)
     training, _ = capture.split()
@@ -323,7 +329,7 @@ def test_wrong_cameras_find_back(run, base):
     poses = training.poses.copy()
     poses[:, :, :3] = Rotation.from_rotvec(turns).as_matrix() @ poses[:, :, :3]
     wrong = replace(training, poses=poses.astype(np.float32))
-    task = trained_task(run, base, wrong, "refine_cameras=true")
+    task = trained_task(run, projection, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
     for step in range(60):
         loss = run_step(task, step, generator).value

@@ -19,7 +19,7 @@ def test_elevations_compare_what_photos_show(texture, monkeypatch):
         return distances[-1]
 
     monkeypatch.setattr(elevations, "single_image_frechet", distance)
-    table = compare_elevations(texture, photos, size=256, patches=20, window=48, places=3, syntheses=2)
+    table = compare_elevations(texture, photos, size=256, patches=8, window=48, places=3, syntheses=2)
     assert [row.angle for row in table][:3] == [0, 20, 40]
     count = 1 + len(FLAT)  # ours and flat ones, in each synthesis; before, by angle, captured and photos
     known = np.reshape(distances[: 2 * len(table)], (len(table), 2))
