@@ -28,8 +28,8 @@ MAPS = ("albedo", "height", "normal")
 SETTINGS = ["steps=30", "milestones=20,25"]  # half of the default, hard to tell from the whole
 # Bundled models, and the meshes that they grow on.
 MODELS = {"ceramic": "octopus", "lava": "knot", "cobblestone": "shaderball"}
-RESOLUTION = 2048  # of what the models grow [texels]
-SIZE, SAMPLES = 512, 64  # of the pictures
+RESOLUTION = 1024  # of what the models grow [texels]
+SIZE, SAMPLES = 512, 40  # of the pictures
 
 
 @dataclass
