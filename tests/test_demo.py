@@ -15,7 +15,10 @@ from mitex.methods import surface
 from mitex.methods.nca import NcaTexture
 from mitex.training.locate import CHECKPOINT, PREVIOUS
 
-TINY = ("resolution=32", "exemplar_size=32", "steps=2", "scales=0", "weights=random", "preview_every=0")
+TINY = (
+    *("resolution=32", "exemplar_size=32", "steps=2", "scales=0", "weights=random", "preview_every=0"),
+    *("start=noise", "layers=relu1_1"),
+)
 
 
 def test_what_it_shows_is_there():

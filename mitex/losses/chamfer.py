@@ -52,7 +52,13 @@ def chamfer(ours: Samples, theirs: Samples) -> tuple[torch.Tensor, torch.Tensor,
         Distance from ours to theirs, distance from theirs to ours (not squared), and 1 - cos of the angles
         between the normals, in both directions; scalars, differentiable in `ours` and `theirs`.
     """
-    to, back = _nearest(ours.points, theirs.points), _nearest(theirs.points, ours.points)
+    return matched(ours, theirs, nearest(ours.points, theirs.points), nearest(theirs.points, ours.points))
+
+
+def matched(
+    ours: Samples, theirs: Samples, to: torch.Tensor, back: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+    """What `chamfer` returns; `to` has the nearest sample of each of ours, `back` of each of theirs."""
     return (
         (ours.points - theirs.points[to]).norm(dim=1).mean(),
         (theirs.points - ours.points[back]).norm(dim=1).mean(),
@@ -61,7 +67,7 @@ def chamfer(ours: Samples, theirs: Samples) -> tuple[torch.Tensor, torch.Tensor,
     )
 
 
-def _nearest(points: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
+def nearest(points: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
     """For each point the index of the nearest of the others."""
     # Unbalanced trees are built three times as fast, and random samples do not need balance.
     tree = KDTree(others.detach().numpy(), balanced_tree=False, compact_nodes=False)

@@ -13,6 +13,7 @@ from mitex.mesh import Mesh, grid, icosphere, quality, subdivide_midpoint
 from mitex.methods.geometric.placement import Bumps
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
+from tests.methods.geometric.small import rough_reports
 from tests.shapes import collapsed, fan, pair, turned
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -21,6 +22,13 @@ QUICK = "--quiet --set steps=4 level_steps=2 fit_steps=20 fit_samples=200 checkp
 
 def fit(words=QUICK, reference="good.obj", out="out/run"):
     return f"fit geometric --reference {reference} --out {out} {words}".split()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _rough_reports():
+    with pytest.MonkeyPatch.context() as patch:
+        rough_reports(patch)
+        yield
 
 
 @pytest.fixture(scope="module")

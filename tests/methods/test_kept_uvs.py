@@ -30,7 +30,7 @@ def test_the_layout_is_kept_if_that_is_asked_for(name, kept, tmp_path, monkeypat
     """A quarter of the square that the mesh has for itself; a new layout uses most of it."""
     square = flat_square(4)
     assert square.uv is not None
-    clay(Mesh(square.vertices, square.faces, uv=0.5 * square.uv)).export(tmp_path / "square.obj")
+    clay(Mesh(square.vertices, square.faces, uv=0.5 * square.uv)).baked(16).export(tmp_path / "square.obj")
     source, place = FITTINGS[name]
     layouts = []
 

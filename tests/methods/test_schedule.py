@@ -11,7 +11,7 @@ from mitex.methods.nca import NcaConfig
 from mitex.methods.nerf.config import RadianceConfig
 from mitex.methods.registry import methods
 from mitex.training.settings import ScheduledConfig
-from tests.methods.fits import FITS, prepare
+from tests.methods.fits import FITS, prepare, small_coarse_fields
 from tests.methods.nca.text.tiny_text import SETTINGS
 from tests.methods.nerf.small import small_texture
 
@@ -50,6 +50,7 @@ def test_gradients_of_nca_are_normalised_on_request():
 def trained(workplace, monkeypatch):
     """What gives the options that the loop is called with for the words after `mitex fit METHOD`."""
     options = {}
+    small_coarse_fields(monkeypatch)
 
     def train(*arguments, **given):
         options.update(given)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 
-from mitex.losses.chamfer import Samples, chamfer, sample_surface
+from mitex.losses.chamfer import Samples, matched, nearest, sample_surface
 from mitex.mesh import Mesh
 from mitex.mesh.self_intersections import piercing_pairs
 
@@ -47,20 +46,24 @@ def report(mesh: Mesh, reference: Mesh, seed: int = 0) -> FitReport:
     generator = torch.Generator().manual_seed(seed)
     ours, theirs = _samples(mesh, generator), _samples(reference, generator)
     extent = float((reference.vertices.max(0) - reference.vertices.min(0)).max()) / 2
-    to, back, cos_to, cos_back = (float(x) for x in chamfer(ours, theirs))
-    tree = KDTree(theirs.points.numpy())
-    centres = mesh.vertices[mesh.faces].mean(1)
-    nearest = theirs.normals.numpy()[tree.query(centres)[1]]
-    both = (ours.points.numpy(), theirs.points.numpy())
-    far = max(float(KDTree(b).query(a)[0].max()) for a, b in (both, both[::-1]))
+    there, here = nearest(ours.points, theirs.points), nearest(theirs.points, ours.points)
+    to, back, cos_to, cos_back = (float(x) for x in matched(ours, theirs, there, here))
+    far = max(_largest(ours.points, theirs.points[there]), _largest(theirs.points, ours.points[here]))
+    centres = torch.from_numpy(mesh.vertices[mesh.faces].mean(1))
+    normals = theirs.normals[nearest(centres, theirs.points)].numpy()
     return FitReport(
         faces=len(mesh.faces),
         chamfer=(to + back) / 2 / extent,
         hausdorff=far / extent,
         normals=float(np.degrees(np.arccos(np.clip(1 - (cos_to + cos_back) / 2, -1, 1)))),
-        flipped=int(((mesh.face_normals * nearest).sum(1) < 0).sum()),
+        flipped=int(((mesh.face_normals * normals).sum(1) < 0).sum()),
         piercing=len(piercing_pairs(mesh)),
     )
+
+
+def _largest(points: torch.Tensor, others: torch.Tensor) -> float:
+    """Distance of two points (n, 3) and (n, 3) that belong together."""
+    return float((points.double() - others.double()).norm(dim=1).max())
 
 
 def _samples(mesh: Mesh, generator: torch.Generator) -> Samples:

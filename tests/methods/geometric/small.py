@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import torch
 
 from mitex.mesh import Mesh, icosphere
@@ -16,6 +17,11 @@ def bumpy() -> Mesh:
     ball = icosphere(12)
     height = 1 + 0.15 * np.sin(7 * ball.vertices).prod(1, keepdims=True)
     return replace(ball.with_vertices(ball.vertices * height), name="bumpy")
+
+
+def rough_reports(patch: pytest.MonkeyPatch) -> None:
+    """How well training meshes fit is told of a few points."""
+    patch.setattr("mitex.methods.geometric.report.SAMPLES", 1000)
 
 
 def small_task(**changes) -> GeometricTask:

@@ -19,7 +19,7 @@ from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.registry import bundled, method_of
 from mitex.training import checkpoint
 from mitex.training.locate import NAME
-from tests.methods.geometric.small import bumpy, same_weights
+from tests.methods.geometric.small import bumpy, rough_reports, same_weights
 from tests.shapes import collapsed, fan, moebius, pair, turned
 from tests.training.contract import assert_same_checkpoint
 
@@ -43,7 +43,9 @@ def hill() -> Mesh:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "bumpy"
-    return folder, geometric.fit(bumpy(), folder, set=SMALL)
+    with pytest.MonkeyPatch.context() as patch:
+        rough_reports(patch)
+        return folder, geometric.fit(bumpy(), folder, set=SMALL)
 
 
 def test_the_run_folder(run):
@@ -233,7 +235,8 @@ def test_variations_of_the_reference(run):
     assert np.array_equal(reconstructions[0], reconstructions[1])
 
 
-def test_resuming_changes_nothing(tmp_path):
+def test_resuming_changes_nothing(tmp_path, monkeypatch):
+    rough_reports(monkeypatch)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

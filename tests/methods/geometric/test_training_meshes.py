@@ -19,6 +19,7 @@ from mitex.methods.geometric.report import report
 from mitex.methods.geometric.template import find_template, normalised, topology
 from mitex.methods.geometric.training_meshes import Fitting
 from mitex.training.optim import Adam
+from tests.methods.geometric.small import rough_reports
 from tests.shapes import fan, moebius, pair
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -185,6 +186,7 @@ def test_steps_become_ten_times_smaller(fitting, monkeypatch):
 
 
 def test_training_meshes_are_kept(monkeypatch):
+    rough_reports(monkeypatch)
     reference, template = normalised(egg(), find_template(egg()))
     first, _ = training_meshes(reference, template, replace(QUICK, steps=1, fit_steps=3))
 
@@ -214,13 +216,13 @@ def test_the_report_by_known_shapes():
     assert beyond.hausdorff == pytest.approx(3, rel=0.02)
     crossing = Mesh(np.concatenate([ball.vertices, ball.vertices + 0.7]), pair(ball).faces)
     assert report(crossing, ball).piercing > 9
-    inside_out = Mesh(ball.vertices, ball.faces[:, ::-1])
-    assert report(inside_out, ball).flipped == len(ball.faces)
-    assert report(inside_out, ball).normals > 176
+    inside_out = report(Mesh(ball.vertices, ball.faces[:, ::-1]), ball)
+    assert inside_out.flipped == len(ball.faces) and inside_out.normals > 176
 
 
-def test_settings_that_read_alike_side_by_side_are_kept_apart():
+def test_settings_that_read_alike_side_by_side_are_kept_apart(monkeypatch):
     """Seed 1 with 23 steps, and seed 12 with 3."""
+    rough_reports(monkeypatch)
     reference, template = normalised(egg(), find_template(egg()))
     config = replace(QUICK, steps=1, fit_samples=100)
     one, other = (

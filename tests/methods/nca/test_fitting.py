@@ -26,7 +26,8 @@ def _losses(folder):
 
 @pytest.fixture(scope="module")
 def lava():
-    return Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
+    """With few pixels, since its typical colours are looked for in each fit."""
+    return Exemplar({"albedo": Exemplar.load("lava").resized(48).maps["albedo"]}, "lava")
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +63,12 @@ def test_the_model_works_on_another_mesh(run):
     assert result.about["name"] == "lava" and result.about["steps"] == 40
     assert result.about["preset"] == "patch"
     assert 0 < result.about["loss"] < 1e3 and result.about["seconds"] >= 0
-    sphere = icosphere(6)
-    grown = result.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"]
+    sphere, options = icosphere(6), {"steps": 10, "subdivide": 0, "resolution": None}
+    grown = result.apply(sphere, **options).vertex_maps["albedo"]
     for source in (out, out / "texture.safetensors"):
         again = NcaTexture.load(source)
         assert again.about == result.about | {"maps": ["albedo"]}
-        assert np.array_equal(again.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"], grown)
+        assert np.array_equal(again.apply(sphere, **options).vertex_maps["albedo"], grown)
     assert grown.std() > 0.003
 
 

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("quick_settling")
 
 @pytest.fixture(scope="module")
 def exemplar():
-    maps = Exemplar.load("scales").maps
+    maps = Exemplar.load("scales").resized(256).maps
     return Exemplar({name: maps[name] for name in ("albedo", "height")}, "scales")
 
 

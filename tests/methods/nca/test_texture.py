@@ -115,7 +115,7 @@ def test_orientation_turns_the_growth_and_the_tangents(texture):
     oriented = texture.grow(mesh, steps=10, orientation=90)
     assert torch.allclose(oriented, texture.grow(turned, steps=10), atol=1e-4)
     assert (oriented - texture.grow(mesh, steps=10)).abs().max() > 1e-3
-    asset = texture.apply(mesh, steps=1, subdivide=0, orientation=90)
+    asset = texture.apply(mesh, steps=1, subdivide=0, orientation=90, resolution=None)
     assert asset.tangents is not None
     assert np.allclose(asset.tangents, [0, 1, 0], atol=1e-6)  # the exemplar's right points up
 
@@ -173,7 +173,7 @@ def test_creases_and_corners_stay(texture, mesh):
 def test_levels_of_subdivision(texture, sphere):
     """Without rounding, for the automaton alone; rounded where it is kept."""
     assert np.array_equal(Cells.of(sphere, 1).mesh.vertices, subdivide_midpoint(sphere, 1).vertices)
-    once = texture.apply(sphere, steps=1, subdivide=1, keep_dense=True).mesh
+    once = texture.apply(sphere, steps=1, subdivide=1, resolution=None, keep_dense=True).mesh
     assert len(once.vertices) == 4 * len(sphere.vertices) - 6
     assert np.array_equal(once.vertices, subdivide_loop(sphere, 1).vertices)
 
@@ -245,7 +245,7 @@ def test_a_larger_scale_has_fewer_cells(texture):
     assert coarse.base is sphere and coarse.levels is None
     assert len(coarse.mesh.vertices) == pytest.approx(642 / 1.4**2, rel=0.15)
     assert np.allclose(np.ptp(coarse.mesh.vertices, axis=0), 2, atol=0.1)
-    dense = texture.apply(sphere, steps=1, subdivide=0, scale=1.4, keep_dense=True).mesh
+    dense = texture.apply(sphere, steps=1, subdivide=0, scale=1.4, resolution=None, keep_dense=True).mesh
     assert len(dense.vertices) == pytest.approx(642 / 1.4**2, rel=0.15)
 
 
@@ -268,7 +268,7 @@ def test_the_exemplar_width_is_a_scale(sphere):
 
 def test_open_mesh_with_several_components_and_loose_vertices(texture):
     mesh = patchwork()
-    asset = texture.apply(mesh, steps=15, subdivide=0)
+    asset = texture.apply(mesh, steps=15, subdivide=0, resolution=64)
     for values in asset.vertex_maps.values():
         assert np.isfinite(values).all()
     assert asset.tangents is not None and np.allclose(np.linalg.norm(asset.tangents, axis=1), 1, atol=1e-5)

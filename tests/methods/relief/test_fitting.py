@@ -21,6 +21,7 @@ from mitex.paths import cache_dir
 from mitex.runtime import threads
 from mitex.training import Cancelled
 from mitex.training.locate import CHECKPOINT, PREVIOUS
+from tests.methods.fits import rough_surfaces
 from tests.methods.relief.waves import AMPLITUDE, waves
 from tests.training.contract import (
     FAULTS,
@@ -147,7 +148,17 @@ def test_faces_that_pierce_each_other_are_counted_on_the_moved_mesh_and_before(m
     assert (about["piercing_before"], about["piercing"]) == (2, 3)
 
 
+def test_maps_are_as_fine_as_the_resolution():
+    """Synthesized as they are by default, but for the number of steps."""
+    texture = relief.fit(waves(*ALL), icosphere(4), set=WITH_MAPS | {"resolution": 48}, steps=1)
+    assert texture.textures["albedo"].shape == texture.apply().maps["albedo"].shape == (48, 48, 3)
+
+
 class TestMaps:
+    @pytest.fixture(autouse=True)
+    def _rough(self, monkeypatch):
+        rough_surfaces(monkeypatch)
+
     def test_colours_are_those_of_surface_and_kept(self, tmp_path):
         """The second fit finds the maps in the cache: `surface` takes no step."""
         stages: list[str] = []
@@ -167,10 +178,6 @@ class TestMaps:
         assert asset.texture_maps is not None
         np.testing.assert_array_equal(asset.texture_maps["albedo"], texture.textures["albedo"])
         np.testing.assert_array_equal(asset.mesh.vertices, texture.moved.vertices)
-
-    def test_they_are_as_fine_as_the_resolution(self):
-        texture = relief.fit(waves(*ALL), icosphere(4), set=WITH_MAPS | {"resolution": 48}, steps=1)
-        assert texture.textures["albedo"].shape == texture.apply().maps["albedo"].shape == (48, 48, 3)
 
     def test_a_fit_in_memory_keeps_nothing(self):
         before = len(results())

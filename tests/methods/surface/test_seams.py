@@ -10,8 +10,9 @@ from mitex.methods import surface
 
 @pytest.mark.usefixtures("own_cache")
 def test_a_synthesis_has_no_seams(tmp_path):
-    """At most a tenth more across seams than elsewhere."""
+    """No more across seams than elsewhere; with texels of their own beyond the charts it would be as much."""
     exemplar = Exemplar({"albedo": Exemplar.load("cobblestone").maps["albedo"]})
-    settings = ["resolution=128", "exemplar_size=64", "steps=60", "milestones=40,50", "preview_every=0"]
-    texture = surface.fit(exemplar, icosphere(12), tmp_path / "run", set=settings)
-    assert seam_ratio(texture.apply(), texture.domain.texels.size) < 1.1
+    settings = ["resolution=128", "exemplar_size=64", "steps=30", "milestones=20,25", "preview_every=0"]
+    layers = "layers=relu1_1,pool1,relu2_1,pool2,relu3_1"
+    texture = surface.fit(exemplar, icosphere(12), tmp_path / "run", set=[*settings, layers])
+    assert seam_ratio(texture.apply(), texture.domain.texels.size) < 0.95

@@ -73,7 +73,8 @@ def test_a_tile_is_synthesized_saved_and_applied(tmp_path):
     exemplar = Exemplar.load("cobblestone").resized(64)
     exemplar = Exemplar({name: exemplar.maps[name] for name in ("albedo", "normal")}, "stones")
     settings = ["resolution=64", "exemplar_size=64", "steps=3", "scales=1", "preview_every=2"]
-    texture = surface.fit(exemplar, None, tmp_path / "run", set=settings)
+    layers = "layers=relu1_1,relu2_1"
+    texture = surface.fit(exemplar, None, tmp_path / "run", set=[*settings, layers])
     assert list((tmp_path / "run" / "previews").iterdir())
     asset = SurfaceTexture.load(tmp_path / "run").apply()
     assert asset.texture_maps is not None and asset.texture_maps["albedo"].shape == (64, 64, 3)

@@ -31,11 +31,13 @@ TINY = [*SETTINGS, "surfaces=even,flat", "motion_steps=2", "pool=2"]
 def soon_in_order(monkeypatch):
     """How long patterns take to settle is tested elsewhere."""
     monkeypatch.setattr(settling, "STEPS", (1,))
+    monkeypatch.setattr(settling, "SIDE", 32)
 
 
 @pytest.fixture(scope="module")
 def lava():
-    return Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
+    """With few pixels, since its typical colours are looked for in each fit."""
+    return Exemplar({"albedo": Exemplar.load("lava").resized(48).maps["albedo"]}, "lava")
 
 
 def _parent(tmp_path, **options):
