@@ -15,7 +15,7 @@ from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.texture import SIZE
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
-from tests.methods.fits import few_patches, quick_bases
+from tests.methods.fits import few_patches, small_coarse_fields
 from tests.methods.nerf.capture.ellipsoid import CENTRE, RADII, rgba, set_alpha, write
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -45,10 +45,10 @@ def save(mesh, path):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _quick_bases():
+def _small_coarse_fields():
     """For all fits, or the base shape of one would not be that of another."""
     with pytest.MonkeyPatch.context() as patch:
-        quick_bases(patch)
+        small_coarse_fields(patch)
         yield
 
 

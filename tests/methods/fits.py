@@ -144,13 +144,12 @@ def coarse_grids(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("mitex.methods.baselines.nerf_tex.boxes.CELLS", 32)
 
 
-def small_coarse_fields(patch: pytest.MonkeyPatch) -> None:
-    """The coarse fields that base meshes get their shells from are as small as the fits, and scanned less."""
+def small_coarse_fields(patch: pytest.MonkeyPatch, **settings: int) -> None:
+    """The coarse fields that base meshes get their shells from are small, and scanned in few pixels."""
     from mitex.methods.nerf.base import coarse
 
-    small = replace(coarse.COARSE, rays=512, table=11, occupancy=32, ray_steps=96)
-    patch.setattr(coarse, "COARSE", small)
-    patch.setattr(coarse, "VIEWS", 4)
+    patch.setattr(coarse, "COARSE", replace(coarse.COARSE, **{"ray_steps": 96, "table": 13, **settings}))
+    patch.setattr(coarse, "SCAN_SIDE", 80)
 
 
 def rough_surfaces(patch: pytest.MonkeyPatch) -> None:
@@ -160,14 +159,6 @@ def rough_surfaces(patch: pytest.MonkeyPatch) -> None:
     given = ReliefConfig.of_surface
     rough = {"start": "noise", "scales": 0, "layers": ("relu1_1",)}
     patch.setattr(ReliefConfig, "of_surface", property(lambda config: given.__get__(config) | rough))
-
-
-def quick_bases(patch: pytest.MonkeyPatch) -> None:
-    """The coarse field that measures a shell's thickness is small, and scanned in few pixels."""
-    from mitex.methods.nerf.base import coarse
-
-    patch.setattr(coarse, "COARSE", replace(coarse.COARSE, ray_steps=96, table=13))
-    patch.setattr(coarse, "SCAN_SIDE", 80)
 
 
 def untrained_bases(patch: pytest.MonkeyPatch) -> None:

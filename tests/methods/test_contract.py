@@ -50,7 +50,7 @@ def toy():
 def quick_beginnings():
     """What fits begin with is made by other fits, which have settings of their own."""
     with pytest.MonkeyPatch.context() as patch:
-        small_coarse_fields(patch)
+        small_coarse_fields(patch, rays=512, table=11, occupancy=32)
         rough_surfaces(patch)
         yield
 

@@ -50,7 +50,7 @@ def test_gradients_of_nca_are_normalised_on_request():
 def trained(workplace, monkeypatch):
     """What gives the options that the loop is called with for the words after `mitex fit METHOD`."""
     options = {}
-    small_coarse_fields(monkeypatch)
+    small_coarse_fields(monkeypatch, rays=512, table=11, occupancy=32)
 
     def train(*arguments, **given):
         options.update(given)

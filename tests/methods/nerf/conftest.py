@@ -11,7 +11,7 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import NerfTexture, fit
 from mitex.methods.nerf.synthesis.maps import LatentMaps
 from mitex.training.locate import NAME
-from tests.methods.fits import quick_bases
+from tests.methods.fits import small_coarse_fields
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 
@@ -34,7 +34,7 @@ def run(tmp_path_factory, base, worker_id) -> Path:
     with FileLock(folder.with_suffix(".lock")), pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
         if not (folder / "run" / NAME).is_file():
-            quick_bases(patch)
+            small_coarse_fields(patch)
             fit(tiny_capture(), folder / "run", base_mesh=base, set=SETTINGS)
     return folder / "run"
 
