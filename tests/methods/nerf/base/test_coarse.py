@@ -20,6 +20,7 @@ from mitex.methods.nerf.base import coarse
 from mitex.methods.nerf.base.base_shape import base_shape, given_base
 from mitex.methods.nerf.base.coarse import find_base
 from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.training import plain
 from mitex.methods.nerf.training.plain import PlainTask
 from mitex.paths import cache_dir
 from mitex.training import Interrupted, checkpoint
@@ -37,9 +38,10 @@ def ball(tmp_path, monkeypatch) -> Mesh:
     monkeypatch.setattr(
         coarse, "COARSE", replace(coarse.COARSE, rays=32, ray_steps=64, table=8, occupancy=16)
     )
+    monkeypatch.setattr(plain, "LEVELS", 2)
     mesh = icosphere(44)
     mesh = mesh.with_vertices(0.55 * mesh.vertices)
-    monkeypatch.setattr(coarse, "scan_surface", lambda task: 1.1 * mesh.vertices)
+    monkeypatch.setattr(coarse, "scan_surface", lambda task: 1.1 * mesh.vertices[::20])
     return mesh
 
 
@@ -172,12 +174,14 @@ def dented_egg(frequency: int) -> Mesh:
 
 
 def test_a_base_shape_is_found_in_photos_alone(tmp_path, monkeypatch):
-    """The whole way: coarse field, scan, convex pieces, mesh; with little training and long edges."""
+    """The whole way: coarse field, scan, convex pieces, mesh; with few steps of many rays, and long edges."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    small = replace(coarse.COARSE, rays=2048, ray_steps=96, table=13, average=0.3)
+    monkeypatch.setattr(coarse, "COARSE", small)
     monkeypatch.setattr(coarse, "GRID", 128)
     monkeypatch.setattr(coarse, "base_shape", partial(base_shape, edge=0.02))
     photos = captured(dented_egg(24), views=12, side=64, spp=8)
-    base = find_base(photos, replace(PRESETS["fast"], base_steps=300))
+    base = find_base(photos, replace(PRESETS["fast"], base_steps=190))
     true = dented_egg(80).vertices
     report = quality(base.mesh)
     assert (report.components, report.boundary_edges, report.genus) == (1, 0, 0)

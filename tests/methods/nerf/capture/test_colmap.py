@@ -50,7 +50,8 @@ def skin(points):
     """Colours (H, W, 3) uint8: waves of three sizes in random directions."""
     rng = np.random.default_rng(1)
     waves = rng.normal(size=(3, 60)) * np.repeat([8.0, 16.0, 32.0], 20)
-    fields = np.cos(points.astype(np.float32) @ waves.astype(np.float32)) @ rng.normal(size=(60, 3))
+    colours = rng.normal(size=(60, 3)).astype(np.float32)
+    fields = np.cos(points.astype(np.float32) @ waves.astype(np.float32)) @ colours
     return np.clip(128 + 11.0 * fields, 0, 255).astype(np.uint8)
 
 

@@ -129,7 +129,8 @@ def test_it_agrees_with_a_slow_reference(rng, neighbours, repulsion):
 
 @pytest.mark.parametrize("shift", [0.0, 1e-7, -1e-7, 1e-6, -1e-6, 1e-5, -1e-5])
 @pytest.mark.parametrize("where", ["vertices", "edges", "faces"])
-def test_points_on_the_surface_are_their_own_feet(ball, where, shift):
+def test_points_on_the_surface_are_their_own_feet(where, shift):
+    ball = icosphere(20)
     corners = ball.vertices[ball.faces]
     x = {"vertices": ball.vertices, "edges": corners[:, :2].mean(1), "faces": corners.mean(1)}[where]
     x = x * np.float32(1 + shift)

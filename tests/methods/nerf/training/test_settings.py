@@ -22,6 +22,7 @@ from mitex.methods.nerf.training.radiance import REFRESH, schedule
 from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import init, threads
 from mitex.training.config import resolve
+from tests.methods.fits import small_coarse_fields
 from tests.methods.nerf.tiny import tiny_capture
 
 init()
@@ -96,6 +97,7 @@ class TestOtherSettings:
             given.append(options)
             raise Stop
 
+        small_coarse_fields(monkeypatch)
         base = icosphere(44)  # even enough not to be remeshed
         settings = ["base_steps=2", "neighbours=5", "repulsion=0.2", "concavity=0.4"]
         monkeypatch.setattr("mitex.methods.nerf.base.coarse.Projection", projection)
