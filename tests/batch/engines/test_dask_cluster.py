@@ -13,6 +13,7 @@ from mitex.batch import Event, status
 from mitex.batch.engines.dask_cluster import NO_LIMIT, Dask
 from mitex.errors import MissingPackage, RuntimeUnavailable
 from mitex.runtime.cores import cores
+from tests.batch.in_this_process import InThisProcess
 
 CLUSTER = """
 import time
@@ -73,6 +74,8 @@ def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
         on_event = when_both_run(workshop, wait_for, cluster.kill)
         with pytest.raises(RuntimeUnavailable, match="the Dask scheduler does not answer any more; start it"):
             workshop.run(plan, engine=engine, on_event=on_event)
+    monkeypatch.delenv("STRIPES_PACE")
+    monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
     assert workshop.run(plan).count("done") == 4
     check_all_is_there(workshop, plan)
 
