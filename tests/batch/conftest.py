@@ -12,6 +12,7 @@ import pytest
 
 from mitex.batch import Plan, Report, run_plan
 from mitex.methods.registry import methods
+from tests.batch.in_this_process import InThisProcess
 
 ROOT, TOY = Path(__file__).parents[2], Path(__file__).parent / "toy"
 PATIENCE = 200.0  # with what happens at once on a machine that has nothing else to do [s]
@@ -40,6 +41,14 @@ class Workshop:
 
     def run(self, plan: Plan, out: str = "out", engine: Any = None, **options: Any) -> Report:
         return run_plan(plan, self.folder / out, engine, threads=1, **options)
+
+    def undisturbed(self, plan: Plan) -> dict[str, bytes]:
+        """What the jobs write that run one after the other, here and as fast as they can."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("mitex.batch.task.Process", InThisProcess)
+            patch.delenv("STRIPES_PACE", raising=False)
+            self.run(plan, "serial")
+        return self.files("serial")
 
     def told(self, word: str, out: str = "") -> list[str]:
         """The jobs in the lines of the log that begin with a word."""

@@ -23,6 +23,7 @@ from mitex.batch.task import RETRIES, Outcome, Task
 from mitex.cli import main
 from mitex.errors import OutputError
 from mitex.runtime import cores
+from tests.batch.in_this_process import InThisProcess
 
 PLAN = """exemplars = ["a.png", "b.png"]
 meshes = ["m.obj"]
@@ -61,8 +62,14 @@ def driver(workshop, monkeypatch):
         process.communicate()
 
 
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """For tests of what a driver does between jobs."""
+    monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
+
+
 class TestOneAfterTheOther:
-    def test_all_is_done_once_and_told(self, workshop):
+    def test_all_is_done_once_and_told(self, workshop, in_this_process):
         events: list[Event] = []
         report = workshop.run(workshop.plan(), on_event=events.append)
         assert report.count("done") == len(report.rows) == 4
@@ -76,13 +83,13 @@ class TestOneAfterTheOther:
         ]
         assert [event.ended for event in events] == [0, 1, 1, 2, 2, 3, 3, 4]
 
-    def test_again_nothing_is_done(self, workshop):
+    def test_again_nothing_is_done(self, workshop, in_this_process):
         first = workshop.run(workshop.plan())
         events = []
         assert workshop.run(workshop.plan(), on_event=events.append) == first
         assert len(workshop.told("start")) == 4 and events == []
 
-    def test_a_larger_plan_goes_on(self, workshop):
+    def test_a_larger_plan_goes_on(self, workshop, in_this_process):
         workshop.run(workshop.plan(("a.png",)))
         report = workshop.run(workshop.plan())
         assert report.count("done") == 4 and len(workshop.told("start")) == 4
@@ -100,7 +107,7 @@ class TestOneAfterTheOther:
         assert [row.job.name for row in report.rows] == ["fit-stripes-a", "apply-stripes-a-m"]
         assert status(report.folder).rows[0].job.name == "fit-stripes-b"
 
-    def test_a_result_that_is_gone_is_made_again(self, workshop):
+    def test_a_result_that_is_gone_is_made_again(self, workshop, in_this_process):
         report = workshop.run(workshop.plan(("a.png",)))
         before = workshop.files()
         (file,) = (report.folder / report.rows[1].job.result).iterdir()
@@ -164,8 +171,7 @@ class TestFailures:
         workshop.run(plan, retry=True)
         assert workshop.told("start").count("fit-stripes-p") == 2
 
-        workshop.run(workshop.plan(("a.png",)), "serial")
-        assert workshop.files() == workshop.files("serial")
+        assert workshop.files() == workshop.undisturbed(workshop.plan(("a.png",)))
 
     def test_a_crash_is_tried_again_a_few_times(self, workshop):
         (workshop.folder / "c.png").write_text("crash")
@@ -202,10 +208,11 @@ class TestFailures:
             patch.setattr(Claim, "note", refuse)
             workshop.run(workshop.plan(steps=1000))
         assert not list(workshop.folder.rglob("claim*"))
+        monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
         assert workshop.run(workshop.plan()).count("done") == 4
 
     @pytest.mark.parametrize("losses", [RETRIES, RETRIES + 1])
-    def test_lost_workers(self, losses, workshop):
+    def test_lost_workers(self, losses, workshop, in_this_process):
         class Fragile(Local):
             left = losses
 
@@ -244,7 +251,7 @@ class TestADiskThatIsAwayForAMoment:
             assert outcome.result().state == "interrupted"
 
     @pytest.mark.parametrize("look", ["done", "failed", "holder"])
-    def test_a_command_looks_again(self, look, workshop, monkeypatch):
+    def test_a_command_looks_again(self, look, workshop, in_this_process, monkeypatch):
         errors, real = [], getattr(BatchFolder, look)
 
         def looked(folder, job):
@@ -258,7 +265,7 @@ class TestADiskThatIsAwayForAMoment:
         assert workshop.run(workshop.plan(("a.png",))).count("done") == 2
         assert len(errors) == 3 and len(workshop.told("start")) == 2
 
-    def test_a_finished_job_is_not_done_again(self, workshop, monkeypatch):
+    def test_a_finished_job_is_not_done_again(self, workshop, in_this_process, monkeypatch):
         report = workshop.run(workshop.plan(("a.png",)))
         monkeypatch.setattr(Path, "stat", stale("results", []))
         with pytest.raises(OutputError, match="Stale file handle"):
@@ -286,14 +293,15 @@ class TestInterruptions:
 
     undisturbed: ClassVar[dict[str, bytes]] = {}  # the files of that run, for all tests
 
-    def check_the_rest(self, workshop, start, patch):
-        patch.delenv("STRIPES_PACE")
-        assert start("--quiet").wait(200) == 0
+    def check_the_rest(self, workshop, patch):
+        """Another call, in this process, does what is left."""
+        patch.delenv("STRIPES_PACE", raising=False)
+        patch.setattr("mitex.batch.task.Process", InThisProcess)
+        workshop.run(workshop.plan(steps=6))
         assert sorted(workshop.told("step")) == sorted(["fit-stripes-a", "fit-stripes-b"] * 6)
         assert status(workshop.folder / "out").count("done") == 4
         if not self.undisturbed:
-            workshop.run(workshop.plan(steps=6), out="serial")
-            self.undisturbed.update(workshop.files("serial"))
+            self.undisturbed.update(workshop.undisturbed(workshop.plan(steps=6)))
         assert workshop.files() == self.undisturbed
 
     def check_the_time(self, workshop):
@@ -311,7 +319,10 @@ class TestInterruptions:
         assert not list((workshop.folder / "out").rglob("claim*"))
         states = [row.state for row in status(workshop.folder / "out").rows]
         assert states == ["interrupted", "waiting"] * 2
-        self.check_the_rest(workshop, driver, monkeypatch)
+        monkeypatch.delenv("STRIPES_PACE")
+        assert driver("--quiet").wait(200) == 0
+        assert status(workshop.folder / "out").count("done") == 4
+        self.check_the_rest(workshop, monkeypatch)
         self.check_the_time(workshop)
 
     def test_a_second_signal_does_not_wait_for_a_step(self, workshop, driver, wait_for, monkeypatch):
@@ -325,12 +336,12 @@ class TestInterruptions:
 
     @pytest.mark.parametrize("engine", ["local", "dask"])
     def test_the_driver_is_killed(self, engine, workshop, driver, wait_for, monkeypatch):
-        """Its fits save their checkpoints. The next command waits until they have ended."""
+        """Its fits save their checkpoints. The next call waits until they have ended."""
         process = driver("--jobs", "2", "--engine", engine)
         wait_for(lambda: len(set(workshop.told("step"))) == 2)
         process.kill()
         process.wait(200)
-        self.check_the_rest(workshop, driver, monkeypatch)
+        self.check_the_rest(workshop, monkeypatch)
         self.check_the_time(workshop)
 
     def test_a_job_that_someone_else_interrupts(self, workshop, wait_for, monkeypatch):
@@ -347,4 +358,4 @@ class TestInterruptions:
         processes = [driver("--quiet", "--jobs", "2", "--engine", engine) for _ in range(2)]
         assert [process.wait(200) for process in processes] == [0, 0]
         assert sorted(workshop.told("start")) == sorted(set(workshop.told("start")))
-        self.check_the_rest(workshop, driver, monkeypatch)
+        self.check_the_rest(workshop, monkeypatch)

@@ -13,6 +13,7 @@ from mitex.batch import Event, status
 from mitex.batch.engines.dask_cluster import NO_LIMIT, Dask
 from mitex.errors import MissingPackage, RuntimeUnavailable
 from mitex.runtime.cores import cores
+from tests.batch.in_this_process import InThisProcess
 
 CLUSTER = """
 import time
@@ -30,13 +31,11 @@ def plan(workshop, monkeypatch):
     return workshop.plan(steps=STEPS)
 
 
-def check_all_is_there(workshop, plan, patch):
+def check_all_is_there(workshop, plan):
     """No step was done twice, and the files are those of a serial run."""
     assert status(workshop.folder / "out").count("done") == 4
     assert sorted(workshop.told("step")) == sorted(["fit-stripes-a", "fit-stripes-b"] * STEPS)
-    patch.setenv("STRIPES_PACE", "0")
-    workshop.run(plan, out="serial")
-    assert workshop.files() == workshop.files("serial")
+    assert workshop.files() == workshop.undisturbed(plan)
 
 
 def when_both_run(workshop, wait_for, action):
@@ -52,7 +51,7 @@ def when_both_run(workshop, wait_for, action):
     return on_event
 
 
-def test_a_worker_is_killed(workshop, plan, wait_for, monkeypatch):
+def test_a_worker_is_killed(workshop, plan, wait_for):
     """The fit that it was at goes on from its checkpoint, with another worker."""
 
     def kill():
@@ -63,7 +62,7 @@ def test_a_worker_is_killed(workshop, plan, wait_for, monkeypatch):
     report = workshop.run(plan, engine=Dask(jobs=2), on_event=on_event)
     assert report.count("done") == 4
     assert workshop.told("start").count("fit-stripes-a") == 2
-    check_all_is_there(workshop, plan, monkeypatch)
+    check_all_is_there(workshop, plan)
 
 
 def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
@@ -75,8 +74,10 @@ def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
         on_event = when_both_run(workshop, wait_for, cluster.kill)
         with pytest.raises(RuntimeUnavailable, match="the Dask scheduler does not answer any more; start it"):
             workshop.run(plan, engine=engine, on_event=on_event)
+    monkeypatch.delenv("STRIPES_PACE")
+    monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
     assert workshop.run(plan).count("done") == 4
-    check_all_is_there(workshop, plan, monkeypatch)
+    check_all_is_there(workshop, plan)
 
 
 def test_a_cluster_of_ours_bears_the_death_of_many_workers():

@@ -28,9 +28,7 @@ def test_a_job_that_has_to_give_way_comes_back_and_goes_on(workshop, wait_for, m
     assert report.count("done") == 2
     assert workshop.told("start").count("fit-stripes-a") == 2
     assert workshop.told("step") == ["fit-stripes-a"] * STEPS
-    monkeypatch.delenv("STRIPES_PACE")
-    workshop.run(plan, "serial")
-    assert workshop.files() == workshop.files("serial")
+    assert workshop.files() == workshop.undisturbed(plan)
 
 
 def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
