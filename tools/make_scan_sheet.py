@@ -3,9 +3,9 @@
 usage: python tools/make_scan_sheet.py MESH [MODEL[=VERTICES] ...]
 
 MESH is split once, its vertices are moved by `ROUGHNESS` edges, and it is cut open at the bottom. Each MODEL
-(default: `MODELS`) grows on it, remeshed to so many VERTICES (or 2,000), as it is and with the option
-`untangle`. Writes docs/gallery/geometric-scan.jpg, and prints how many faces, edges at borders and piercing
-pairs there are, and the seconds.
+(default: `MODELS`) grows on it, remeshed to so many VERTICES (default: `VERTICES`), as it is and with the
+option `untangle`. Writes docs/gallery/geometric-scan.jpg, and prints how many faces, edges at borders and
+piercing pairs there are, and the seconds.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 300  # side of a picture [px]
 ROUGHNESS = 0.15  # standard deviation of the noise along each axis [mean edges]
 CUT = 0.03  # share of the vertices below which faces are taken away
-VERTICES = "2000"
+VERTICES = 2_000
 MODELS = ("spikes", "scales=16000")  # that of the scales adds no vertices
 
 
@@ -69,7 +69,7 @@ def main() -> None:
     results, labels = [scan], ["a rough mesh, cut open"]
     for word in names or MODELS:
         name, _, vertices = word.partition("=")
-        even = reported("remeshed", remesh, scan, int(vertices or VERTICES))
+        even = reported("remeshed", remesh, scan, int(vertices) if vertices else VERTICES)
         texture = GeometricTexture.load(name)
         for untangle, label in ((False, name), (True, f"{name}, untangled")):
             results.append(reported(label, grown, texture, even, untangle))

@@ -20,6 +20,8 @@ from mitex.optional import optional
 FOLDER = "slurm"  # of what submitit keeps, in the batch folder
 MINUTES = 24 * 60  # that a job may take, if nobody says otherwise
 MOST_RETURNS = 10_000  # of a job into the queue; each goes on from a checkpoint
+SEVERAL = ("nodes", "ntasks_per_node")  # options that would start a job more than once, at the same time
+LINES = ("setup", "teardown", "srun_args")  # options that submitit takes as lists
 
 
 class Slurm(Engine):
@@ -131,8 +133,8 @@ def _option(text: str) -> tuple[str, int | str | list[str]]:
     if not (equals and key and value):
         raise ConfigError(f"'{text}' is no option of Slurm", "write KEY=VALUE, such as partition=cpu")
     key = key.replace("-", "_")
-    if key in ("nodes", "ntasks_per_node"):
+    if key in SEVERAL:
         raise ConfigError(f"a job is one process, whose {key} cannot be set", "leave that option out")
-    if key in ("setup", "teardown", "srun_args"):
+    if key in LINES:
         return f"slurm_{key}", [value]
     return f"slurm_{key}", int(value) if value.isdecimal() else value
