@@ -4,7 +4,7 @@ from mitex.runtime.causes import raise_causes
 from mitex.runtime.devices import available_device
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
-from mitex.runtime.precision import bfloat16_is_fast, uses_bfloat16
+from mitex.runtime.precision import bfloat16_is_fast, mixed_precision, uses_bfloat16
 from mitex.runtime.seeds import seed_everything
 from mitex.runtime.session import init, load_mitsuba
 from mitex.runtime.workers import (
@@ -26,6 +26,7 @@ __all__ = [
     "let_idle_threads_sleep",
     "load_mitsuba",
     "lower_worker_priority",
+    "mixed_precision",
     "raise_causes",
     "seed_everything",
     "set_workers",

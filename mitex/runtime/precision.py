@@ -1,10 +1,16 @@
 """Which number formats this machine computes quickly."""
 
+from __future__ import annotations
+
 import os
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mitex.errors import ConfigError
+
+if TYPE_CHECKING:
+    import torch
 
 VARIABLE = "MITEX_BF16"
 PRECISIONS = ("auto", "bfloat16", "float32")
@@ -44,6 +50,16 @@ def uses_bfloat16(precision: str, device: str = "cpu") -> bool:
     if precision not in PRECISIONS:
         raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
     return precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(device))
+
+
+def mixed_precision(device: str = "cpu") -> torch.autocast:
+    """A context in which torch multiplies matrices in bfloat16, where that is fast on a device.
+
+    Products and their gradients are bfloat16 then; weights, and gradients of weights, stay float32.
+    """
+    import torch
+
+    return torch.autocast(device, torch.bfloat16, enabled=bfloat16_is_fast(device))
 
 
 @cache

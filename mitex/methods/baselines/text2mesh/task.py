@@ -17,7 +17,7 @@ from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
 from mitex.methods.layout import exemplar_texels
 from mitex.methods.neural_style.cameras import cameras_of, frame_height
 from mitex.methods.neural_style.field import colours, encoded, head, opened, random_waves, trunk
-from mitex.runtime import keep_freed_memory
+from mitex.runtime import keep_freed_memory, mixed_precision
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.scenes.shaded import BACKGROUND
 from mitex.scenes.stage import Stage
@@ -85,7 +85,9 @@ class Text2MeshTask(ParameterTask):
         corners = torch.from_numpy(self.ball.vertices[self.ball.faces[hits.face.numpy()]])
         points = (hits.barycentric[..., None] * corners).sum(1)
         pixels = torch.full((len(hits.hit), 3), BACKGROUND)
-        pixels[hits.hit] = self.colours(points, weights)
+        with mixed_precision():
+            seen = self.colours(points, weights)
+        pixels[hits.hit] = seen.float()
         shape = len(cameras), cameras.height, cameras.width
         return pixels.view(*shape, 3), hits.hit.view(*shape)
 
