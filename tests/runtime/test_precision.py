@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import pytest
+import torch
 
 from mitex.errors import ConfigError
-from mitex.runtime import bfloat16_is_fast, uses_bfloat16
+from mitex.runtime import bfloat16_is_fast, mixed_precision, uses_bfloat16
 from mitex.runtime.precision import VARIABLE, bfloat16_flags
 
 
@@ -45,3 +46,15 @@ def test_a_network_has_the_precision_that_it_is_given(monkeypatch: pytest.Monkey
     assert [uses_bfloat16(word) for word in ("bfloat16", "float32", "auto")] == [True, False, fast]
     with pytest.raises(ConfigError, match="unknown precision 'bf16'"):
         uses_bfloat16("bf16")
+
+
+@pytest.mark.parametrize(("fast", "dtype"), [(False, torch.float32), (True, torch.bfloat16)])
+def test_products_are_mixed_where_that_is_fast(
+    monkeypatch: pytest.MonkeyPatch, fast: bool, dtype: torch.dtype
+):
+    monkeypatch.setenv(VARIABLE, str(int(fast)))
+    weight = torch.randn(4, 3, requires_grad=True)
+    with mixed_precision():
+        product = torch.nn.functional.linear(torch.randn(2, 3), weight)
+    product.float().sum().backward()
+    assert product.dtype == dtype and weight.grad is not None and weight.grad.dtype == torch.float32

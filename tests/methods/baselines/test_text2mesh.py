@@ -20,6 +20,7 @@ from mitex.methods.exemplar_pictures import albedo
 from mitex.methods.layout import with_layout
 from mitex.methods.neural_style.cameras import cameras_of
 from mitex.runtime import threads
+from mitex.runtime.precision import VARIABLE
 from mitex.scenes.cameras import orbit
 from tests.cli import bad_files
 from tests.methods.neural_style.tiny import shaken, tiny
@@ -61,6 +62,22 @@ class TestViews:
         baked = task.baked()
         used = np.unravel_index(task.texels.index, baked.shape[:2])
         np.testing.assert_allclose(baked[used], 0.5 + 0.5 * task.texels.position, atol=1e-5)
+
+    def test_bfloat16_changes_them_little_and_the_baked_texture_not_at_all(self, ball, exemplar, monkeypatch):
+        def learned(setting: str) -> tuple[torch.Tensor, torch.Tensor, np.ndarray]:
+            monkeypatch.setenv(VARIABLE, setting)
+            task = Text2MeshTask(CONFIG, exemplar, ball)
+            task.named["colours.2.weight"].data.normal_(generator=torch.Generator().manual_seed(0))
+            pictures = task.views(orbit(1, distance=2.0, fov=60.0, resolution=48))[0]
+            (pictures[..., 0].mean() - pictures[..., 2].mean()).backward()
+            gradients = torch.cat([p.grad.flatten() for p in task.parameters])
+            return pictures.detach(), gradients, task.baked()
+
+        exact, mixed = learned("0"), learned("1")
+        assert 0 < (exact[0] - mixed[0]).abs().max() < 0.01
+        assert torch.cosine_similarity(exact[1], mixed[1], dim=0) > 0.999
+        assert not torch.equal(exact[1], mixed[1])
+        np.testing.assert_array_equal(exact[2], mixed[2])
 
     def test_cameras_around_the_front_and_around_all(self):
         def origins(**options) -> np.ndarray:
