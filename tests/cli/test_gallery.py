@@ -16,7 +16,7 @@ def tab(browser, tmp_path_factory):
     mesh.write_bytes(ball())
     out = folder / "gallery.html"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 20)
+        patch.setattr("mitex.methods.geometric.coarse_patches.PLACES", 20)
         assert main(["gallery", "--mesh", str(mesh), "--out", str(out), "--quiet"]) == 0
     assert out.stat().st_size < 3_000_000
     return browser.open(out, 96)

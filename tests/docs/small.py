@@ -133,7 +133,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr("mitex.methods.geometric.references.FREQUENCY", 12)
     patch.setattr("mitex.methods.geometric.fitting.LAID", 1)
-    patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 10)
+    patch.setattr("mitex.methods.geometric.coarse_patches.PLACES", 10)
     patch.setattr("mitex.methods.geometric.report.SAMPLES", 500)
     patch.setattr("mitex.methods.geometric.example.RINGS", (RING,))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())

@@ -155,7 +155,7 @@ def test_relief_and_colour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("pymeshlab")
     quick = partialmethod(NcaTexture.apply, steps=40, subdivide=0, resolution=128)
     monkeypatch.setattr(NcaTexture, "apply", quick)
-    monkeypatch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 20)
+    monkeypatch.setattr("mitex.methods.geometric.coarse_patches.PLACES", 20)
     script, ball = load("relief_and_colour"), icosphere(8)
     flat = ball.with_vertices(ball.vertices * np.array([1.0, 0.6, 1.0]))
     monkeypatch.setattr(script, "embedded", lambda _name: flat)

@@ -18,23 +18,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mitex.errors import ConfigError
 from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
 from mitex.mesh.frames import vertex_directions
 from mitex.mesh.low_pass import blurred, low_pass
 from mitex.mesh.nearest import distances
+from mitex.methods.geometric.coarse_patches import RATE, cached_patches, height_patches
 from mitex.methods.geometric.placement import even_places, separate_tops
 from mitex.quilting.matching import ArraySource
 from mitex.quilting.surface import quilt_on
-from mitex.quilting.vertices import VertexTarget, vertex_patches
+from mitex.quilting.vertices import VertexTarget
 
 FINE, WIDE = 1.0, 4.0  # widths of filters [mean edges]: what is wider than the second is shape
 SKEWED = 0.5  # skewness of heights from which on they are bumps, or dents, on a ground
-PATCH = 16  # side of a patch [mean edges]
-SHARE = 0.34  # of the side of a square as large as the mesh, at most
-RATE = 2  # texels of a patch on an edge
-PLACES, TURNS = 250, 8  # that patches are taken at, and directions
+TURNS = 8  # directions of patches without a field
 RING = 0.5  # width of a ring around a bump in which heights are averaged [mean edges]
 
 
@@ -47,12 +44,14 @@ class CoarseRelief:
         heights: (V,) of the coarse part above it [mesh units].
         field: (V, 3) the vectors that it follows; None for a relief without a direction.
         symmetric: whether a vector and its opposite are the same.
+        kept: whether its patches are kept in the cache.
     """
 
     base: Mesh
     heights: np.ndarray
     field: np.ndarray | None = None
     symmetric: bool = False
+    kept: bool = False
 
     @property
     def displacements(self) -> np.ndarray:
@@ -66,20 +65,9 @@ class CoarseRelief:
         Raises:
             ConfigError: none fits on the base.
         """
-        edge = _mean_edge(self.base)
-        side = min(PATCH * edge, SHARE * float(self.base.face_areas.sum()) ** 0.5)
-        size = 8 * max(round(side / edge * RATE / 8), 1)
-        heights = (self.heights / edge)[:, None]
-        rng = np.random.default_rng(0)
         turns = TURNS if self.field is None else 1 + self.symmetric
-        right = _right(self.base, self.field)
-        patches = vertex_patches(self.base, heights, size, edge / RATE, PLACES, turns, rng, right)
-        if not len(patches.values):
-            raise ConfigError(
-                f"no square {size // RATE} edges wide lies flat on {self.base.name}",
-                "begin on a higher level (`first_level`)",
-            )
-        return patches
+        patches = cached_patches if self.kept else height_patches
+        return patches(self.base, self.heights, _right(self.base, self.field), turns)
 
     @cached_property
     def bumps(self) -> np.ndarray:

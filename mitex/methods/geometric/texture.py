@@ -68,7 +68,8 @@ class GeometricTexture:
             return None
         heights = dot(self.fixed.numpy().astype(np.float64), self.template.normals)
         field = self.fields[0].numpy() if self.fields else None
-        return CoarseRelief(self.template, heights, field, self.about.get("field") == files.LINE)
+        symmetric = self.about.get("field") == files.LINE
+        return CoarseRelief(self.template, heights, field, symmetric, kept=True)
 
     @property
     def first(self) -> int:

@@ -1,5 +1,6 @@
 """The coarse part of a relief: what of it is taken, and what is laid like it."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,8 +14,9 @@ from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere, torus
 from mitex.mesh.fields import vector_field
 from mitex.mesh.low_pass import blurred
-from mitex.methods.geometric import coarse_relief
-from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief
+from mitex.methods.geometric import coarse_patches, coarse_relief
+from mitex.methods.geometric.coarse_patches import PATCH, RATE
+from mitex.methods.geometric.coarse_relief import FINE, TURNS, WIDE, CoarseRelief
 
 BALL = icosphere(16)
 split = cache(coarse_relief.split)  # of the meshes below, which are made once
@@ -25,7 +27,7 @@ TORUS = torus(64, 28, tube=0.45)
 @pytest.fixture(autouse=True)
 def few_patches(monkeypatch):
     """Which take seconds."""
-    monkeypatch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 50)
+    monkeypatch.setattr("mitex.methods.geometric.coarse_patches.PLACES", 50)
 
 
 def with_heights(heights: np.ndarray) -> Mesh:
@@ -236,3 +238,32 @@ def test_a_reference_without_room_for_a_patch_is_refused():
     tiny = icosphere(1)
     with pytest.raises(ConfigError, match="no square 4 edges wide lies flat on .*; begin on a higher level"):
         _ = CoarseRelief(tiny, np.zeros(len(tiny.vertices))).patches
+
+
+class TestKeptPatches:
+    @pytest.fixture(autouse=True)
+    def own_cache(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+    def test_they_are_taken_once(self, monkeypatch):
+        """Another process finds them in the cache, and lays the same."""
+        coarse = replace(split(waves(8)), kept=True)
+        first = coarse.on(BALL)(0)
+        computed = coarse_patches.height_patches(coarse.base, coarse.heights, None, TURNS)
+        monkeypatch.setattr(coarse_patches, "height_patches", lambda *_: pytest.fail("taken again"))
+        again = replace(coarse)
+        np.testing.assert_array_equal(again.patches.values, computed.values)
+        np.testing.assert_array_equal(again.patches.centres, computed.centres)
+        assert again.patches.length == computed.length
+        np.testing.assert_array_equal(again.on(BALL)(0), first)
+
+    def test_those_of_other_reliefs_are_others(self):
+        coarse = replace(split(waves(8)), kept=True)
+        other = replace(coarse, heights=-coarse.heights)
+        along = replace(along_up(False), kept=True)
+        both = replace(along, symmetric=True)
+        for one, two in ((coarse, other), (along, both)):
+            assert not np.array_equal(one.patches.values, two.patches.values)
+
+    def test_those_of_a_training_are_not_kept(self, tmp_path):
+        assert len(split(waves(8)).patches.values) and not list(tmp_path.iterdir())

@@ -27,7 +27,7 @@ def few_coarse_reliefs():
     """A training starts from few of them, which are quilted from few patches: all of them take seconds."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mitex.methods.geometric.fitting.LAID", 3)
-        patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 60)
+        patch.setattr("mitex.methods.geometric.coarse_patches.PLACES", 60)
         yield
 
 

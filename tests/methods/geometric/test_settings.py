@@ -78,7 +78,7 @@ def learned(field: str | None = "up", **settings: object) -> list[torch.Tensor]:
         patch("mitex.methods.geometric.fitting.report", lambda *_: SimpleNamespace()),
         patch("mitex.methods.geometric.fitting.level_fields", known_fields),
         patch("mitex.methods.geometric.fitting.LAID", 2),
-        patch("mitex.methods.geometric.coarse_relief.PLACES", 60),
+        patch("mitex.methods.geometric.coarse_patches.PLACES", 60),
     ):
         texture = geometric.fit(icosphere(4), field=field, set=words)
     return [p.detach() for generator in texture.generators for p in generator.parameters]
