@@ -15,7 +15,7 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import text2mesh
 from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
 from mitex.methods.baselines.text2mesh.config import PRESETS, share_open
-from mitex.methods.baselines.text2mesh.task import Text2MeshTask
+from mitex.methods.baselines.text2mesh.task import ROWS, Text2MeshTask
 from mitex.methods.exemplar_pictures import albedo
 from mitex.methods.layout import with_layout
 from mitex.methods.neural_style.cameras import cameras_of
@@ -54,11 +54,15 @@ class TestViews:
     def test_they_show_the_colours_of_places(self, ball, exemplar, monkeypatch):
         """A field that is the place itself: the middle of a view from +z is the pole of the ball."""
         task = Text2MeshTask(CONFIG, exemplar, ball)
-        monkeypatch.setattr(task, "colours", lambda points, *_: 0.5 + 0.5 * points)
+        rows = []
+        monkeypatch.setattr(
+            task, "colours", lambda points, *_: rows.append(len(points)) or 0.5 + 0.5 * points
+        )
         views, masks = task.views(orbit(1, elevation=0, distance=2.0, fov=60.0, resolution=49, start=90))
         assert torch.allclose(views[0, 24, 24], torch.tensor([0.5, 0.5, 1.0]), atol=0.02)
         assert views[0, 24, 40, 0] > 0.7 and views[0, 8, 24, 1] > 0.7
         assert masks[0, 24, 24] and not masks[0, 0, 0] and torch.equal(views[0, 0, 0], torch.ones(3))
+        assert rows == [ROWS]  # a number that depended on the view would fill torch's cache
         baked = task.baked()
         used = np.unravel_index(task.texels.index, baked.shape[:2])
         np.testing.assert_allclose(baked[used], 0.5 + 0.5 * task.texels.position, atol=1e-5)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
@@ -25,6 +26,7 @@ from mitex.texels import Texels
 from mitex.training import ParameterTask, Step
 
 CHUNK = 1 << 16  # places at a time
+ROWS = 4096  # views are evaluated in a multiple of it: torch keeps megabytes for each number, in bfloat16
 
 
 class Text2MeshTask(ParameterTask):
@@ -86,8 +88,8 @@ class Text2MeshTask(ParameterTask):
         points = (hits.barycentric[..., None] * corners).sum(1)
         pixels = torch.full((len(hits.hit), 3), BACKGROUND)
         with mixed_precision():
-            seen = self.colours(points, weights)
-        pixels[hits.hit] = seen.float()
+            seen = self.colours(F.pad(points, (0, 0, 0, -len(points) % ROWS)), weights)
+        pixels[hits.hit] = seen[: len(points)].float()
         shape = len(cameras), cameras.height, cameras.width
         return pixels.view(*shape, 3), hits.hit.view(*shape)
 
