@@ -68,6 +68,7 @@ PUBLISHED: dict[tuple[str, str], dict[str, Any]] = {
         "antialias": 1,
         "by_depth": True,
         "by_angle": True,
+        "clamped": False,
         "frontal": 30.0,
         "layers": FIRST_OF_BLOCKS,
         "weights": (0.1, 0.1, 1e-3, 1e-3, 0.1),  # 1000, 1000, 10, 10, 1000, all times 1e-4

@@ -11,7 +11,13 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import style_mesh
 from mitex.methods.baselines.style_mesh import StyleMeshConfig, StyleMeshTexture
-from mitex.methods.baselines.style_mesh.layered import fine_energy, keep_in_range, sum_of, zero_textures
+from mitex.methods.baselines.style_mesh.layered import (
+    fine_energy,
+    keep_in_range,
+    sum_of,
+    within_range,
+    zero_textures,
+)
 from mitex.methods.baselines.style_mesh.task import StyleMeshTask
 from mitex.methods.baselines.style_mesh.visible import (
     Counting,
@@ -91,6 +97,13 @@ class TestTextures:
         assert total.max() < 0
         total.sum().backward()
         assert dark.grad is not None and bool((dark.grad == 2).all())
+
+    def test_a_clamped_texture_comes_back(self):
+        texture = torch.tensor([-0.5, 0.25, 1.5], requires_grad=True)
+        shown = within_range(texture)
+        assert shown.tolist() == [0, 0.25, 1]
+        shown.sum().backward()
+        assert texture.grad is not None and texture.grad.tolist() == [1, 1, 1]
 
     def test_finer_textures_cost_more(self):
         values = [torch.full((3, 2, 2), 0.5) for _ in range(5)]
@@ -247,6 +260,7 @@ class TestTask:
                 {"layers": ("relu2_1",), "weights": (1.0,)},
                 {"weights": (1.0, 3.0)},
                 {"small_layers": ()},
+                {"clamped": False},
                 {"textures": 2},
             ),
         ):

@@ -44,6 +44,9 @@ class StyleMeshConfig(ScheduledConfig):
     small_layers: tuple[str, ...] = key(
         ("relu4_1", "relu5_1"), "layers that are compared with the exemplar at half its size, too"
     )
+    clamped: bool = key(
+        True, "views show the sum of the textures clamped to [0, 1], as it is saved; the paper: unclamped"
+    )
     coarse_first: float = key(
         3.25e8, "how much finer textures are held near zero, so that coarse ones take what they can", 0
     )
@@ -81,6 +84,7 @@ PRESETS = {
         views=100,
         heights=4,
         antialias=1,
+        clamped=False,
         lr=0.004,
         milestones=(6000, 12_000),
     ),

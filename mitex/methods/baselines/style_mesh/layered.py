@@ -30,6 +30,11 @@ def sum_of(textures: Sequence[torch.Tensor]) -> torch.Tensor:
     return total.movedim(0, -1) + total.new_tensor(MEAN)
 
 
+def within_range(texture: torch.Tensor) -> torch.Tensor:
+    """A texture clamped to [0, 1]; its gradients pass as if it was not, so that texels come back."""
+    return texture + (texture.clamp(0, 1) - texture).detach()
+
+
 @torch.no_grad()
 def keep_in_range(textures: Sequence[torch.Tensor]) -> None:
     """Clamps each texture (3, s, s), in place, to where it alone gives colours in [0, 1], as published."""

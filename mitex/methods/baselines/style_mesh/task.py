@@ -16,7 +16,13 @@ from mitex.features.vgg19 import named_vgg
 from mitex.losses.gram import gram_distance, gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.style_mesh.config import LEAST_SIDE, StyleMeshConfig
-from mitex.methods.baselines.style_mesh.layered import fine_energy, keep_in_range, sum_of, zero_textures
+from mitex.methods.baselines.style_mesh.layered import (
+    fine_energy,
+    keep_in_range,
+    sum_of,
+    within_range,
+    zero_textures,
+)
 from mitex.methods.baselines.style_mesh.visible import Counting, Visible, cameras_around, places_in, shares
 from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.methods.layout import exemplar_texels
@@ -80,7 +86,7 @@ class StyleMeshTask(ParameterTask):
         Each height's distance is weighted by its share of all pixels that count.
         """
         view = int(torch.randint(self.config.views, (), generator=generator))
-        texture, total = sum_of(self.parameters), torch.zeros(())
+        texture, total = self._shown(), torch.zeros(())
         counting = [self._counting(view, k) for k in range(len(self.heights))]
         whole = sum(pixels.share.mean() for pixels in counting)
         for k, pixels in enumerate(counting):
@@ -106,6 +112,11 @@ class StyleMeshTask(ParameterTask):
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
         key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
         return {"method": "style_mesh", "mesh": self.mesh.name, "mesh_key": key} | exemplar
+
+    def _shown(self) -> torch.Tensor:
+        """(R, R, 3) the texture that views show, sRGB; in [0, 1] if it is `clamped`."""
+        texture = sum_of(self.parameters)
+        return within_range(texture) if self.config.clamped else texture
 
     def _picture_loss(self, texture: torch.Tensor, view: int, k: int, pixels: Counting) -> torch.Tensor:
         """Of the picture of one height, in which pixels count; their gradients are weighted by how much.
