@@ -29,17 +29,17 @@ from mitex.textures.shell_field import shell_field  # noqa: E402
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDE = 400  # of a picture [px]
-SPP = 64
+SPP = 32
 LAMP = np.array([-3.5, 3.2, 4.0])  # its place
 BARS = 5  # each way
 
 
 def lattice() -> dict[str, Any]:
     """Crossed bars between the lamp and the object."""
-    towards = mi.ScalarTransform4f().look_at((0.5 * LAMP).tolist(), [0, 0, 0], [0, 1, 0])
+    towards = mi.ScalarTransform4f().look_at((0.4 * LAMP).tolist(), [0, 0, 0], [0, 1, 0])
     places = np.linspace(-0.75, 0.75, BARS)
-    across = [towards.translate([float(x), 0, 0]).scale([0.04, 1.0, 0.02]) for x in places]
-    along = [towards.translate([0, float(y), 0]).scale([1.0, 0.04, 0.02]) for y in places]
+    across = [towards.translate([float(x), 0, 0]).scale([0.06, 1.0, 0.02]) for x in places]
+    along = [towards.translate([0, float(y), 0]).scale([1.0, 0.06, 0.02]) for y in places]
     return {f"bar{k}": {"type": "cube", "to_world": turn} for k, turn in enumerate(across + along)}
 
 
@@ -53,19 +53,19 @@ def in_a_shadow(applied: AppliedTexture) -> np.ndarray:
     floor = mi.ScalarTransform4f().translate([0, float((outline[:, 1].min() - centre[1]) / radius), 0])
     scene = {
         "type": "scene",
-        "integrator": {"type": "lit_shell", "field": field, "max_depth": 4, "hide_emitters": True},
+        "integrator": {"type": "lit_shell", "field": field, "max_depth": 4},
         "sensor": {
             "type": "perspective",
             "fov": 30,
             "to_world": mi.ScalarTransform4f().look_at([0, 1.2, 4.2], [0, -0.05, 0], [0, 1, 0]),
             "film": {"type": "hdrfilm", "width": SIDE, "height": SIDE},
         },
-        "sky": {"type": "constant", "radiance": 0.25},
+        "sky": {"type": "constant", "radiance": 0.3},
         "lamp": {
             "type": "sphere",
             "center": LAMP.tolist(),
-            "radius": 0.2,
-            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 500.0}},
+            "radius": 0.08,
+            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 4500.0}},
         },
         "floor": {"type": "rectangle", "to_world": floor.rotate([1, 0, 0], -90).scale(20)},
     }

@@ -46,6 +46,7 @@ CONFIG = StyleMeshConfig(
     layers=("relu1_1", "relu2_1"),
     weights=(1.0, 1.0),
     small_layers=("relu2_1",),
+    by_angle=True,
     preview_every=0,
     milestones=(),
 )
@@ -57,6 +58,7 @@ SMALL = {
     "layers": ("relu1_1",),
     "weights": (1.0,),
     "small_layers": ("relu1_1",),
+    "by_angle": True,
     "checkpoint_every": 2,
     "preview_every": 0,
 }

@@ -31,7 +31,9 @@ class StyleMeshConfig(ScheduledConfig):
     antialias: int = key(2, "n for n x n rays per pixel; the paper: 1", 1, 8)
     by_depth: bool = key(True, "a pixel counts in the pictures in which it is as large as a texel")
     by_angle: bool = key(
-        True, "pixels count by the cosine of the angle they are seen at, and small details where it is small"
+        False,
+        "pixels count by the cosine of the angle they are seen at, and small details where it is small; "
+        "the paper: true",
     )
     frontal: float = key(30.0, "angle up to which small details of the exemplar are added [degrees]", 0, 90)
     network: Literal["vgg16", "vgg19"] = key(
@@ -84,6 +86,7 @@ PRESETS = {
         views=100,
         heights=4,
         antialias=1,
+        by_angle=True,
         clamped=False,
         lr=0.004,
         milestones=(6000, 12_000),
