@@ -307,6 +307,7 @@ class TestRefused:
             ("resolution=100", "use a multiple of 8"),
             ("exemplar_size=63", "choose 0, or 64 or more"),
             ("view=8", "out of range"),
+            ("frontal=20", "frontal means nothing without by_angle=true; leave it out"),
         ],
     )
     def test_settings(self, setting, message, exemplar, ball):

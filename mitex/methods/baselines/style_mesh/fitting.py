@@ -10,6 +10,7 @@ from mitex.mesh import Mesh
 from mitex.methods.baselines.style_mesh.config import PRESETS
 from mitex.methods.baselines.style_mesh.task import StyleMeshTask
 from mitex.methods.baselines.style_mesh.texture import StyleMeshTexture
+from mitex.methods.checks import reject_idle
 from mitex.methods.layout import with_layout
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
@@ -42,6 +43,8 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
+    if not config.by_angle:
+        reject_idle(options.get("set", ()), {"frontal"}, "without by_angle=true")
     target = Exemplar.of(exemplar).of_albedo()
     given = Mesh.of(mesh)
     surface = with_layout(given, config.resolution, keep_uvs)
