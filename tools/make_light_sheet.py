@@ -1,9 +1,9 @@
-"""Shows a captured texture in the light of its photos, in the studio's, and in the shadow of a lattice.
+"""Shows a captured texture in the light of its photos, in the studio's, and behind a lattice.
 
     python tools/make_light_sheet.py RUN ...
 
 Each RUN is a finished run of `mitex fit nerf`, and a row of docs/gallery/nerf-light.jpg: the texture on the
-vase that ships with Mitex, three times.
+vase that ships with Mitex, three times, and the share of the light that the lattice leaves.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def lattice() -> dict[str, Any]:
     return {f"bar{k}": {"type": "cube", "to_world": turn} for k, turn in enumerate(across + along)}
 
 
-def in_a_shadow(applied: AppliedTexture) -> np.ndarray:
-    """The texture on a floor, under a small lamp with the lattice in front and a weak sky."""
+def under_a_lamp(applied: AppliedTexture, entries: dict[str, Any]) -> np.ndarray:
+    """The texture on a floor, under a small lamp and a weak sky, with further entries of the scene."""
     outline = applied.outline
     centre = outline.mean(0)
     radius = float(np.linalg.norm(outline - centre, axis=1).max())
@@ -69,7 +69,7 @@ def in_a_shadow(applied: AppliedTexture) -> np.ndarray:
         },
         "floor": {"type": "rectangle", "to_world": floor.rotate([1, 0, 0], -90).scale(20)},
     }
-    return np.array(mi.render(mi.load_dict(scene | lattice()), spp=SPP))[..., :3]
+    return np.array(mi.render(mi.load_dict(scene | entries), spp=SPP))[..., :3]
 
 
 def main() -> None:
@@ -84,9 +84,11 @@ def main() -> None:
             )
             for light in ("own", "scene")
         ]
-        cells.append(tone(in_a_shadow(applied)))
-        labels += [f"{run.name}, own light", "the studio's", "behind a lattice"]
-    write_image(GALLERY / "nerf-light.jpg", sheet(cells, columns=3, labels=labels, cell=SIDE))
+        shaded, lit = under_a_lamp(applied, lattice()), under_a_lamp(applied, {})
+        share = (shaded.mean(2) / np.maximum(lit.mean(2), 1e-4)).clip(0, 1)
+        cells += [tone(shaded), np.repeat(share[..., None], 3, axis=2)]
+        labels += [f"{run.name}, own light", "the studio's", "behind a lattice", "light that it leaves"]
+    write_image(GALLERY / "nerf-light.jpg", sheet(cells, columns=4, labels=labels, cell=SIDE))
 
 
 if __name__ == "__main__":
