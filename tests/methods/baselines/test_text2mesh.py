@@ -73,8 +73,8 @@ class TestViews:
             task = Text2MeshTask(CONFIG, exemplar, ball)
             task.named["colours.2.weight"].data.normal_(generator=torch.Generator().manual_seed(0))
             pictures = task.views(orbit(1, distance=2.0, fov=60.0, resolution=48))[0]
-            (pictures[..., 0].mean() - pictures[..., 2].mean()).backward()
-            gradients = torch.cat([p.grad.flatten() for p in task.parameters])
+            difference = pictures[..., 0].mean() - pictures[..., 2].mean()
+            gradients = torch.cat([g.flatten() for g in torch.autograd.grad(difference, task.parameters)])
             return pictures.detach(), gradients, task.baked()
 
         exact, mixed = learned("0"), learned("1")
