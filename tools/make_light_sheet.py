@@ -29,7 +29,7 @@ from mitex.textures.shell_field import shell_field  # noqa: E402
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDE = 400  # of a picture [px]
-SPP = 32
+SPP = 24
 LAMP = np.array([-3.5, 3.2, 4.0])  # its place
 BARS = 5  # each way
 
