@@ -35,7 +35,9 @@ class StyleMeshConfig(ScheduledConfig):
         "pixels count by the cosine of the angle they are seen at, and small details where it is small; "
         "the paper: true",
     )
-    frontal: float = key(30.0, "angle up to which small details of the exemplar are added [degrees]", 0, 90)
+    frontal: float = key(
+        30.0, "with by_angle: the angle up to which small details are added [degrees]", 0, 90
+    )
     network: Literal["vgg16", "vgg19"] = key(
         "vgg16", "whose features are compared; vgg19 (the paper) is a file of yours (mitex.features.vgg19)"
     )
@@ -44,7 +46,8 @@ class StyleMeshConfig(ScheduledConfig):
     )
     weights: tuple[float, ...] = key((0.1, 0.1, 0.001, 0.001, 0.1), "weights of the layers", 0)
     small_layers: tuple[str, ...] = key(
-        ("relu4_1", "relu5_1"), "layers that are compared with the exemplar at half its size, too"
+        ("relu4_1", "relu5_1"),
+        "with by_angle: layers that are compared with the exemplar at half its size, too",
     )
     clamped: bool = key(
         True, "views show the sum of the textures clamped to [0, 1], as it is saved; the paper: unclamped"

@@ -73,7 +73,8 @@ class StyleMeshTask(ParameterTask):
         self.weights = dict(zip(config.layers, config.weights, strict=True))
         self.exemplar_side = exemplar_texels(config.exemplar_size, config.resolution, LEAST_SIDE)
         self.targets = self._grams(self.exemplar_side, config.layers)
-        self.small_targets = self._grams(self.exemplar_side // 2, config.small_layers)
+        small_layers = config.small_layers if config.by_angle else ()
+        self.small_targets = self._grams(self.exemplar_side // 2, small_layers)
 
     @property
     def texture(self) -> torch.Tensor:
@@ -130,7 +131,7 @@ class StyleMeshTask(ParameterTask):
         taps, wanted = {}, {}
         for layer in self.config.layers:
             targets = [self.targets[layer]]
-            if self.config.by_angle and layer in self.small_targets:
+            if layer in self.small_targets:
                 targets.append(self.small_targets[layer])
             size = self.network.extent(layer, *picture.shape[:2])
             areas = [

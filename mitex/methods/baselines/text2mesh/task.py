@@ -26,7 +26,7 @@ from mitex.texels import Texels
 from mitex.training import ParameterTask, Step
 
 CHUNK = 1 << 16  # places at a time
-ROWS = 4096  # views are evaluated in a multiple of it: torch keeps megabytes for each number, in bfloat16
+ROWS = 4096  # views are evaluated in a multiple of it, see `mixed_precision`
 
 
 class Text2MeshTask(ParameterTask):
