@@ -56,7 +56,7 @@ def mixed_precision(device: str = "cpu") -> torch.autocast:
     """A context in which torch multiplies matrices in bfloat16, where that is fast on a device.
 
     Products and their gradients are bfloat16 then; weights, and gradients of weights, stay float32.
-    Torch keeps what it compiles for each number of rows, some megabytes: numbers that vary should be rounded up.
+    Torch keeps what it compiles for each number of rows, some megabytes: round up numbers that vary.
     """
     import torch
 
