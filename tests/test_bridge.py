@@ -20,6 +20,8 @@ from mitex.scenes.stage import Stage
 from tests.scenes.helpers import gradient, live_variables
 from tests.scenes.reference import images, matrix
 
+AT_A_SLANT = 2e-5  # of float32 where a ray meets a slanted face; Embree takes each CPU's own instructions
+
 
 @pytest.fixture
 def mesh(rng) -> Mesh:
@@ -47,14 +49,14 @@ def test_lookup_and_its_gradient(mesh, field, rng, kind: str, antialias: int, ba
     picture = lookup(attached, visibility, background)
     expected = images(mesh, views, field.numpy(), np.array(background), antialias)
     assert picture.shape == (2, 9, 11, 4)
-    np.testing.assert_allclose(picture.detach().numpy(), expected, atol=1e-5)
+    np.testing.assert_allclose(picture.detach().numpy(), expected, atol=AT_A_SLANT)
 
     upstream = torch.from_numpy(rng.normal(size=picture.shape).astype(np.float32))
     (picture * upstream).sum().backward()
     reference = field.double().requires_grad_()
     weights = torch.from_numpy(matrix(mesh, views, antialias))
     (weights @ reference * upstream).sum().backward()
-    np.testing.assert_allclose(gradient(attached), gradient(reference), atol=1e-5)
+    np.testing.assert_allclose(gradient(attached), gradient(reference), atol=AT_A_SLANT)
 
     direction = torch.from_numpy(rng.normal(size=field.shape).astype(np.float32))
     high, low = (lookup(field + t * direction, visibility, background).double() for t in (0.1, -0.1))

@@ -26,8 +26,12 @@ CASES: list[tuple[Kind, tuple[str, ...]]] = [
 UNEVEN = scattered_sphere(60)
 
 
-def random_look(interpolation: Kind = "smooth", coordinates: tuple[str, ...] = (), seed: int = 0) -> Look:
-    config = NcaConfig(interpolation=interpolation, coordinates=coordinates, decoder_width=8)
+def random_look(
+    interpolation: Kind = "smooth", coordinates: tuple[str, ...] = (), seed: int = 0, depth: int = 3
+) -> Look:
+    config = NcaConfig(
+        interpolation=interpolation, coordinates=coordinates, decoder_width=8, decoder_depth=depth
+    )
     look = Look.of(config, MAPS)
     look.initialise(torch.Generator().manual_seed(seed), 0.5)
     return look
