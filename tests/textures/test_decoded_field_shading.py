@@ -43,7 +43,7 @@ def test_reflectance_in_a_path_tracer(mi, points):
 def test_constant_field_equals_a_constant(mi):
     """Albedo and roughness of a principled BSDF in a path-traced picture.
 
-    A path tracer's kernel has each texture several times: one with a deep network takes half a minute to compile.
+    Kernels of path tracers have textures several times: deep networks would take half a minute to compile.
     """
     mesh, look = icosphere(4), random_look("linear", depth=1)
     last = layers(look)[-1]
