@@ -53,17 +53,18 @@ class DecoderShape {
   }
 
   _states() {
-    const read = (c, k, part) => `texelFetch(state${c}, slot[${k}]${part ? ` + ivec2(0, ${part} * height)` : ""}, 0)`;
-    const sum = (c) => [0, 1, 2].map((k) => this.smooth
-      ? `ofValue[${k}] * ${read(c, k, 0)} + ${[1, 2, 3].map((part) => `ofSlope[${k}][${part - 1}] * ${read(c, k, part)}`).join(" + ")}`
-      : `barycentric[${k}] * ${read(c, k, 0)}`).join("\n + ");
-    return (this.smooth ? "weigh();\n" : "") + each(this.vectors, (c) => `vec4 s${c} = ${sum(c)};`);
+    const read = (c, part) => `texelFetch(state${c}, slot[k]${part ? ` + ivec2(0, ${part} * height)` : ""}, 0)`;
+    const slopes = (c) => [1, 2, 3].map((part) => ` + ofSlope[k][${part - 1}] * ${read(c, part)}`).join("");
+    const share = (c) => (this.smooth ? `ofValue[k] * ${read(c, 0)}${slopes(c)}` : `barycentric[k] * ${read(c, 0)}`);
+    return `${this.smooth ? "weigh();" : ""}
+      ${each(this.vectors, (c) => `vec4 s${c} = vec4(0.0);`)}
+      for (int k = 0; k < 3; k++) { ${each(this.vectors, (c) => `s${c} += ${share(c)};`)} }`;
   }
 
   // The vectors of four numbers that the network reads beside the states.
   _coordinates() {
     const numbers = this.decoder.coordinates.flatMap((name) => ({
-      waves: Array.from({ length: this.waves }, (_, k) => `amplitude * wave(waves[${k}])`),
+      waves: Array.from({ length: this.waves }, (_, k) => `along[${k}]`),
       barycentrics: [0, 1, 2].map((k) => `sortedBarycentrics()[${k}]`),
       polynomials: [0, 1].map((k) => `symmetricPolynomials()[${k}]`),
     }[name]));
@@ -71,25 +72,25 @@ class DecoderShape {
     return Array.from({ length: numbers.length / 4 }, (_, k) => `vec4(${numbers.slice(4 * k, 4 * k + 4).join(", ")})`);
   }
 
+  // A layer is a loop: written out, its shader takes ten times as long to compile on a processor.
   _network(names) {
-    const lines = this.waves ? ["scaleWaves(position);"] : [];
+    const count = this.waves;
+    const lines = count ? ["scaleWaves(position);", `float along[${count}];`,
+      `for (int k = 0; k < ${count}; k++) along[k] = amplitude * wave(waves[k]);`] : [];
     let inputs = Array.from({ length: this.vectors }, (_, c) => `s${c}`);
     this._coordinates().forEach((vector, k) => {
       lines.push(`vec4 e${k} = ${vector};`);
       inputs.push(`e${k}`);
     });
-    let at = 0;
+    let first = 0;
     this.layers.forEach(({ groups, width }, layer) => {
-      const outputs = Array.from({ length: groups }, (_, o) => `y${layer}_${o}`);
-      outputs.forEach((output, o) => {
-        const first = at + o * (width + 1);
-        const product = (name) => `${name}[${first + width}][0] + `
-          + inputs.map((x, i) => `${name}[${first + i}] * ${x}`).join(" + ");
-        const sum = names.length > 1 ? `mix(${names.map(product).join(", ")}, share0)` : product(names[0]);
-        lines.push(`vec4 ${output} = ${layer < this.layers.length - 1 ? `sin(${sum})` : `${sum} + 0.5`};`);
-      });
-      at += groups * (width + 1);
-      inputs = outputs;
+      const product = (name) => `${name}[k + ${width}][0] + ` + inputs.map((x, i) => `${name}[k + ${i}] * ${x}`).join(" + ");
+      const sum = names.length > 1 ? `mix(${names.map(product).join(", ")}, share0)` : product(names[0]);
+      const value = layer < this.layers.length - 1 ? `sin(${sum})` : `${sum} + 0.5`;
+      lines.push(`vec4 y${layer}[${groups}];`, `for (int o = 0; o < ${groups}; o++) {`,
+        `int k = ${first} + o * ${width + 1};`, `y${layer}[o] = ${value};`, "}");
+      first += groups * (width + 1);
+      inputs = Array.from({ length: groups }, (_, o) => `y${layer}[${o}]`);
     });
     this.outputs = inputs;
     return lines.join("\n");
