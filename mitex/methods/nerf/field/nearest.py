@@ -49,9 +49,11 @@ class NearestVertices:
         self._shape = np.ceil(extent / self._cell).astype(np.int64)
         self._lookup = min(count + EXTRA, len(vertices))
         self._slot = np.full(int(self._shape.prod()), NEW, np.int32)
-        self._lists = np.zeros((0, LENGTH * self._lookup), np.uint32)
-        self._lengths = np.zeros(0, np.uint32)
-        self._table, self._ends = mi.UInt32(), mi.UInt32()
+        self._corner = np.full(int((self._shape + 1).prod()), NEW, np.int32)
+        self._around = np.zeros((0, self._lookup), np.uint32)
+        self._apart = np.zeros(0, np.float32)
+        self._width = LENGTH * self._lookup
+        self._entries, self._lengths = Growing(), Growing()
 
     def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Finds the nearest vertices of points (N, 3) float32.
@@ -110,10 +112,10 @@ class NearestVertices:
         """K `mi.UInt32`, from the nearest on, for points `mi.Point3f` with lists `mi.UInt32`."""
         distances = [mi.Float(dr.inf) for _ in range(self.count)]
         nearest = [mi.UInt32(0) for _ in range(self.count)]
-        first, length = slot * self._lists.shape[1], dr.gather(mi.UInt32, self._ends, slot)
+        first, length = slot * self._width, dr.gather(mi.UInt32, self._lengths.values, slot)
         entry = mi.UInt32(0)
         while entry < length:
-            vertex = dr.gather(mi.UInt32, self._table, first + entry)
+            vertex = dr.gather(mi.UInt32, self._entries.values, first + entry)
             distance = dr.squared_norm(dr.gather(mi.Point3f, self._vertices, vertex) - x)
             # Sorted insertion: what is put aside goes on down the row.
             for k in range(self.count):
@@ -130,27 +132,62 @@ class NearestVertices:
     def _list(self, cells: np.ndarray) -> None:
         """Makes the lists of cells, given by their ascending flat numbers."""
         at = np.stack(np.unravel_index(cells, self._shape), axis=1)
-        corners = np.ravel_multi_index(tuple((at[:, None] + CORNERS).T), tuple(self._shape + 1)).T
-        corners, used = np.unique(corners, return_inverse=True)
-        used = used.reshape(-1, 8)
-        points = self._low + self._cell * np.stack(np.unravel_index(corners, self._shape + 1), axis=1)
-        distance, index = self._tree.query(points, k=self._lookup, workers=tree_threads(len(points)))
-        distance, index = (a.reshape(len(corners), -1) for a in (distance, index.astype(np.uint32)))
+        used = self._looked_up(np.ravel_multi_index(tuple((at[:, None] + CORNERS).T), self._shape + 1).T)
         # No place in a cell is farther from the nearest corner than half a diagonal.
-        far = distance[used, 0].min(axis=1) - 0.5 * math.sqrt(3.0) * self._cell > self.limit
-        entries = np.sort(index[used].reshape(len(cells), -1), axis=1)
+        far = self._apart[used].min(axis=1) - 0.5 * math.sqrt(3.0) * self._cell > self.limit
+        entries = np.sort(self._around[used].reshape(len(cells), -1), axis=1)
         different = np.diff(entries.astype(np.int64), axis=1, prepend=-1) > 0
         length = different.sum(axis=1)
-        usable = ~far & (length <= self._lists.shape[1])
-        usable[np.flatnonzero(usable)[CELLS - len(self._lists) :]] = False
+        usable = ~far & (length <= self._width)
+        usable[np.flatnonzero(usable)[CELLS - len(self._lengths) :]] = False
         self._slot[cells] = np.where(far, FAR, UNLISTED)
-        self._slot[cells[usable]] = len(self._lists) + np.arange(usable.sum())
+        self._slot[cells[usable]] = len(self._lengths) + np.arange(usable.sum())
         self._append(entries[usable], different[usable])
+
+    def _looked_up(self, corners: np.ndarray) -> np.ndarray:
+        """(C, 8) where the vertices nearest to corners (C, 8), flat numbers, are kept.
+
+        Cells that are listed later share most of their corners with those that are.
+        """
+        new = np.unique(corners[self._corner[corners] == NEW])
+        if len(new):
+            points = self._low + self._cell * np.stack(np.unravel_index(new, self._shape + 1), axis=1)
+            distance, index = self._tree.query(points, k=self._lookup, workers=tree_threads(len(points)))
+            distance, index = (a.reshape(len(new), -1) for a in (distance, index))
+            self._corner[new] = len(self._apart) + np.arange(len(new))
+            self._around = np.concatenate([self._around, index.astype(np.uint32)])
+            self._apart = np.concatenate([self._apart, distance[:, 0].astype(np.float32)])
+        return self._corner[corners]
 
     def _append(self, entries: np.ndarray, different: np.ndarray) -> None:
         """Adds lists of the entries (C, E) that are different from the one before."""
-        lists = np.zeros((len(entries), self._lists.shape[1]), np.uint32)
+        lists = np.zeros((len(entries), self._width), np.uint32)
         lists[np.nonzero(different)[0], (different.cumsum(axis=1) - 1)[different]] = entries[different]
-        self._lists = np.concatenate([self._lists, lists])
-        self._lengths = np.concatenate([self._lengths, different.sum(axis=1, dtype=np.uint32)])
-        self._table, self._ends = upload(mi.UInt32, self._lists.ravel()), upload(mi.UInt32, self._lengths)
+        self._entries.append(lists.ravel())
+        self._lengths.append(different.sum(axis=1, dtype=np.uint32))
+
+
+class Growing:
+    """Numbers for Dr.Jit, `values`, which grow at their end; there is room for twice as many as needed.
+
+    Copying all of them for a few more, step by step, would take most of the time of the first steps of a fit.
+    """
+
+    def __init__(self) -> None:
+        self.values, self._count = mi.UInt32(), 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def append(self, numbers: np.ndarray) -> None:
+        """Adds some, (N,) uint32."""
+        count = self._count + len(numbers)
+        if count > dr.width(self.values):
+            before, self.values = self.values, dr.zeros(mi.UInt32, 2 * count)
+            if self._count:
+                dr.scatter(self.values, before, dr.arange(mi.UInt32, dr.width(before)))
+        if len(numbers):
+            place = dr.opaque(mi.UInt32, self._count) + dr.arange(mi.UInt32, len(numbers))
+            dr.scatter(self.values, upload(mi.UInt32, numbers), place)
+        dr.eval(self.values)
+        self._count = count

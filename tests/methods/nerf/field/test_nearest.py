@@ -1,11 +1,13 @@
 """Nearest vertices by lists, against all distances."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mitex.mesh import icosphere
 from mitex.methods.nerf.field import nearest
-from mitex.methods.nerf.field.nearest import FAR, UNLISTED, NearestVertices
+from mitex.methods.nerf.field.nearest import FAR, UNLISTED, Growing, NearestVertices
 
 
 @pytest.fixture(autouse=True)
@@ -48,6 +50,33 @@ def test_asking_again_changes_nothing(rng):
     first = near(points)[1]
     near(points[::-1] * np.float32(1.1))
     np.testing.assert_array_equal(near(points)[1], first)
+
+
+def test_places_are_listed_one_by_one_as_at_once(rng, monkeypatch):
+    """Cells that are listed later share corners with those before, which are looked up once."""
+    vertices, points = uneven(rng), rng.uniform(-0.8, 0.8, (200, 3)).astype(np.float32)
+    at_once, slowly = (NearestVertices(vertices, 8, 0.1) for _ in range(2))
+    corners, query = [], slowly._tree.query
+
+    def counted(places, **options):
+        corners.extend(map(tuple, places))
+        return query(places, **options)
+
+    monkeypatch.setattr(slowly, "_tree", SimpleNamespace(query=counted))
+    expected = at_once(points)[1]
+    np.testing.assert_array_equal([slowly(point[None])[1][0] for point in points], expected)
+    assert (slowly._slots(points) >= 0).sum() > 150 and len(set(corners)) == len(corners) > 200
+
+
+@pytest.mark.parametrize("sizes", [(1, 0, 40, 3), (100, 1, 1)])
+def test_numbers_grow_at_their_end(rng, sizes):
+    parts = [rng.integers(0, 1000, size).astype(np.uint32) for size in sizes]
+    growing = Growing()
+    for part in parts:
+        growing.append(part)
+    together = np.concatenate(parts)
+    assert len(growing) == len(together)
+    np.testing.assert_array_equal(np.array(growing.values)[: len(together)], together)
 
 
 def test_any_spacing_is_right(rng):
