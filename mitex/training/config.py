@@ -1,9 +1,8 @@
 """Resolving a config from a preset, a TOML file and `key=value` settings."""
 
 import tomllib
-import typing
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,6 +10,7 @@ from mitex.errors import ConfigError
 from mitex.reading import content, reading
 from mitex.suggestions import suggestion
 from mitex.training import values
+from mitex.training.settings import kinds
 
 Config = TypeVar("Config")
 
@@ -40,9 +40,9 @@ def resolve(
         ConfigError: An unknown key or preset (the closest match is named), a value of the wrong type, not
             finite or out of range, an unreadable file, or two presets that contradict each other.
     """
-    kinds = _kinds(next(iter(presets.values())))
-    from_file = {} if file is None else _from_file(Path(file), kinds)
-    from_overrides = {key: _read(key, value, kinds, _value) for key, value in by_key(overrides).items()}
+    types = kinds(type(next(iter(presets.values()))))
+    from_file = {} if file is None else _from_file(Path(file), types)
+    from_overrides = {key: _read(key, value, types, _value) for key, value in by_key(overrides).items()}
     places = {"": preset, " in the settings": from_overrides.get("preset")}
     name = _agreed(places | {f" in '{file}'": from_file.get("preset")}) or next(iter(presets))
     if name not in presets:
@@ -57,8 +57,8 @@ def of_record(config: type[Config], record: Mapping[str, Any]) -> Config:
         ValueError: A value of the wrong type, or not finite.
         ConfigError: One out of its range.
     """
-    kinds = typing.get_type_hints(config)
-    return config(**{key: values.check(value, kinds[key]) for key, value in record.items() if key in kinds})
+    types = kinds(config)
+    return config(**{key: values.check(value, types[key]) for key, value in record.items() if key in types})
 
 
 def _agreed(places: Mapping[str, str | None]) -> str | None:
@@ -82,11 +82,6 @@ def by_key(overrides: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
     return dict(overrides if isinstance(overrides, Mapping) else map(_split, overrides))
 
 
-def _kinds(example: Any) -> dict[str, Any]:
-    hints = typing.get_type_hints(type(example))
-    return {field.name: hints[field.name] for field in fields(example)}
-
-
 def _split(setting: str) -> tuple[str, str]:
     key, equals, text = setting.partition("=")
     if not equals or not key.strip():
@@ -98,7 +93,7 @@ def _value(value: Any, kind: Any) -> Any:
     return values.parse(value, kind) if isinstance(value, str) else values.check(value, kind)
 
 
-def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
+def _from_file(file: Path, types: Mapping[str, Any]) -> dict[str, Any]:
     with reading(file, ConfigError, "check the path"):
         data = content(file, LARGEST)
     with reading(file, ConfigError, "mend the file", "is not valid TOML"):
@@ -106,10 +101,10 @@ def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
     for table in RECORD_TABLES:
         if isinstance(settings.get(table), dict):
             del settings[table]
-    return {key: _read(key, value, kinds, values.check) for key, value in settings.items()}
+    return {key: _read(key, value, types, values.check) for key, value in settings.items()}
 
 
-def _read(key: str, value: Any, kinds: Mapping[str, Any], reader: Callable[[Any, Any], Any]) -> Any:
-    if key not in kinds:
-        raise ConfigError(f"there is no key '{key}'", suggestion(key, kinds))
-    return values.read(reader, value, kinds[key], key)
+def _read(key: str, value: Any, types: Mapping[str, Any], reader: Callable[[Any, Any], Any]) -> Any:
+    if key not in types:
+        raise ConfigError(f"there is no key '{key}'", suggestion(key, types))
+    return values.read(reader, value, types[key], key)

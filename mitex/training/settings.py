@@ -5,6 +5,7 @@ from __future__ import annotations
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypedDict, get_args, get_origin
 
@@ -57,6 +58,12 @@ def key(default: Any, meaning: str, low: float | None = None, high: float | None
     return field(default=default, metadata={"meaning": meaning, "range": (low, high)})
 
 
+@cache
+def kinds(config: type) -> dict[str, Any]:
+    """The types of a config's keys, by name; kept, since evaluating their texts takes a millisecond."""
+    return typing.get_type_hints(config)
+
+
 @dataclass(frozen=True)
 class FitConfig:
     """What every method's config has; a default-constructed one is the method's default preset.
@@ -72,10 +79,10 @@ class FitConfig:
     seed: int = key(0, "number that all random choices follow from", *SEEDS)
 
     def __post_init__(self) -> None:
-        kinds = typing.get_type_hints(type(self))
+        types = kinds(type(self))
         for one in fields(self):
             value = getattr(self, one.name)
-            _check_choice(one.name, value, kinds[one.name])
+            _check_choice(one.name, value, types[one.name])
             _check_range(one.name, value, *bounds(type(self), one))
 
 
@@ -132,12 +139,12 @@ class Row(NamedTuple):
 
 def rows(config: FitConfig) -> list[Row]:
     """Every key of a config, in the order of its declaration."""
-    kinds = typing.get_type_hints(type(config))
+    types = kinds(type(config))
     return [
         Row(
             one.name,
             _written(getattr(config, one.name)),
-            _allowed(kinds[one.name], *bounds(type(config), one)),
+            _allowed(types[one.name], *bounds(type(config), one)),
             meaning(type(config), one),
         )
         for one in fields(config)
