@@ -8,6 +8,10 @@ PYTHON ?= $(shell for newest in 13 99; do for p in python3 python3.13 python3.12
 VENV := .venv
 STAMP := $(VENV)/.installed
 
+# Many a container asks Python to keep no compiled files. The tests start a hundred processes, and each would
+# compile all of Mitex again.
+export PYTHONDONTWRITEBYTECODE =
+
 .PHONY: setup demo test lint docs bench clean
 
 setup: $(STAMP)
