@@ -15,6 +15,7 @@ from mitex.scenes.shapes import mesh_shape
 from mitex.textures.interpolation import Kind
 from tests.textures.helpers import FACES, QUAD, interaction
 
+CHANNELS = 12  # of states: the fewer, the sooner a kernel is compiled
 MAPS = ("albedo", "height", "normal")  # 7 channels; height is number 3
 EVERY = ("waves", "barycentrics", "polynomials")
 CASES: list[tuple[Kind, tuple[str, ...]]] = [
@@ -30,7 +31,11 @@ def random_look(
     interpolation: Kind = "smooth", coordinates: tuple[str, ...] = (), seed: int = 0, depth: int = 3
 ) -> Look:
     config = NcaConfig(
-        interpolation=interpolation, coordinates=coordinates, decoder_width=8, decoder_depth=depth
+        channels=CHANNELS,
+        interpolation=interpolation,
+        coordinates=coordinates,
+        decoder_width=8,
+        decoder_depth=depth,
     )
     look = Look.of(config, MAPS)
     look.initialise(torch.Generator().manual_seed(seed), 0.5)
@@ -43,7 +48,7 @@ def layers(look: Look) -> list[nn.Linear]:
 
 
 def random_state(mesh: Mesh) -> torch.Tensor:
-    return 0.4 * torch.randn(len(mesh.vertices), 16, generator=torch.Generator().manual_seed(1))
+    return 0.4 * torch.randn(len(mesh.vertices), CHANNELS, generator=torch.Generator().manual_seed(1))
 
 
 def random_points(mesh: Mesh, count: int = 200) -> Points:

@@ -23,7 +23,7 @@ def test_mean_and_max_go_over_the_vertices(mi):
 
 def test_to_string(mi):
     text = str(mi.load_dict(properties(random_look("linear", ("waves", "polynomials")))))
-    assert text.startswith("DecodedField[\n  vertices = 60,\n  states = 16,\n  channels = 7,\n")
+    assert text.startswith("DecodedField[\n  vertices = 60,\n  states = 12,\n  channels = 7,\n")
     assert "interpolation = linear,\n  coordinates = waves polynomials,\n  channel = 0" in text
 
 

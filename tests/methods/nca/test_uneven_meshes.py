@@ -38,7 +38,7 @@ def coarse(rng: np.random.Generator) -> Mesh:
     hull = ConvexHull(points)
     used, faces = np.unique(hull.simplices, return_inverse=True)
     mesh = Mesh(points[used].astype(np.float32), faces.reshape(-1, 3), name="hull")
-    return subdivide_midpoint(mesh, int(np.ceil(np.log(1000 / len(used)) / np.log(4))))
+    return subdivide_midpoint(mesh, int(np.ceil(np.log(600 / len(used)) / np.log(4))))
 
 
 def fan(spokes: int, rng: np.random.Generator) -> Mesh:
@@ -49,13 +49,15 @@ def fan(spokes: int, rng: np.random.Generator) -> Mesh:
     k = np.arange(spokes)
     top = np.stack([k, np.full(spokes, spokes), (k + 1) % spokes], 1)
     bottom = np.stack([(k + 1) % spokes, np.full(spokes, spokes + 1), k], 1)
-    return jittered(subdivide_midpoint(Mesh(points, np.concatenate([top, bottom])), 4), rng)
+    return jittered(
+        subdivide_midpoint(Mesh(points, np.concatenate([top, bottom])), 4 if spokes < 10 else 3), rng
+    )
 
 
 @cache
 def meshes() -> list[Mesh]:
     rng = np.random.default_rng(0)
-    smooth = [icosphere(15), torus(48, 40), scattered_sphere(2000, 1), scattered_sphere(2000, 2)]
+    smooth = [icosphere(11), torus(36, 32), scattered_sphere(1200, 1), scattered_sphere(1200, 2)]
     every = [stretched(mesh, rng) for mesh in smooth] + [jittered(mesh, rng) for mesh in smooth]
     every += [jittered(stretched(mesh, rng), rng) for mesh in smooth]
     every += [coarse(rng) for _ in range(12)]
