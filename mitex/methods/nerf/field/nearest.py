@@ -132,8 +132,8 @@ class NearestVertices:
     def _list(self, cells: np.ndarray) -> None:
         """Makes the lists of cells, given by their ascending flat numbers."""
         at = np.stack(np.unravel_index(cells, self._shape), axis=1)
-        corners = np.ravel_multi_index(tuple((at[:, None] + CORNERS).T), tuple(self._shape + 1)).T
-        used = self._looked_up(corners)
+        corners = np.ravel_multi_index(tuple((at[:, None] + CORNERS).T), tuple(self._shape + 1))
+        used = self._looked_up(np.transpose(corners))
         # No place in a cell is farther from the nearest corner than half a diagonal.
         far = self._apart[used].min(axis=1) - 0.5 * math.sqrt(3.0) * self._cell > self.limit
         entries = np.sort(self._around[used].reshape(len(cells), -1), axis=1)
