@@ -72,7 +72,7 @@ class DecoderShape {
     return Array.from({ length: numbers.length / 4 }, (_, k) => `vec4(${numbers.slice(4 * k, 4 * k + 4).join(", ")})`);
   }
 
-  // A layer is a loop: written out, its shader takes ten times as long to compile on a processor.
+  // A layer is a loop: written out, its shader takes more than twice as long to compile on a processor.
   _network(names) {
     const count = this.waves;
     const lines = count ? ["scaleWaves(position);", `float along[${count}];`,
