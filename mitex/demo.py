@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 # Synthesized here and now: exemplar, mesh, maps.
 EXEMPLAR, MESH = "hexagons", "vase"
 MAPS = ("albedo", "height", "normal")
-SETTINGS = ["steps=30", "milestones=20,25"]  # half of the default, hard to tell from the whole
+SETTINGS = ["steps=20", "milestones=13,17"]  # a third of the default, hard to tell from more
 # Bundled models, and the meshes that they grow on.
 MODELS = {"ceramic": "octopus", "lava": "knot", "cobblestone": "shaderball"}
 RESOLUTION = 1024  # of what the models grow [texels]
