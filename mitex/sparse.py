@@ -127,7 +127,8 @@ class _Product(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, rows: torch.Tensor, matrix: torch.Tensor, adjoint: torch.Tensor) -> torch.Tensor:
         ctx.adjoint = adjoint
-        return matrix @ rows.contiguous()
+        with torch.autocast(rows.device.type, enabled=False):  # which knows no sparse matrices
+            return matrix @ rows.contiguous()
 
     @staticmethod
     @once_differentiable

@@ -32,6 +32,13 @@ def test_linear_map(generator, rng, kind):
     _gradcheck(matrix, torch.from_numpy(dense).float(), 6, generator)
 
 
+def test_a_linear_map_stays_exact_under_autocast(rng):
+    matrix, rows = rng.random((4, 3)), torch.from_numpy(rng.random((3, 2)).astype(np.float32))
+    with torch.autocast("cpu", torch.bfloat16):
+        result = LinearMap(scipy.sparse.csr_array(matrix))(rows)
+    np.testing.assert_allclose(result.numpy(), matrix @ rows.numpy(), rtol=1e-5)
+
+
 def test_a_linear_map_takes_rows_in_any_order_in_memory(generator, rng):
     dense = rng.normal(size=(5, 4)).astype(np.float32)
     columns = torch.randn(3, 4, generator=generator)

@@ -21,6 +21,7 @@ from mitex.methods.baselines.reaction_diffusion.reaction import Reaction, colour
 from mitex.methods.baselines.reaction_diffusion.task import ReactionDiffusionTask
 from mitex.methods.baselines.reaction_diffusion.texture import even_cells
 from mitex.runtime import threads
+from mitex.runtime.precision import VARIABLE
 from mitex.sparse import LinearMap
 from tests.methods.surface.grids import flat_square
 from tests.training.contract import (
@@ -158,6 +159,19 @@ class TestTask:
             *({"inject_every": 1}, {"min_steps": 3}, {"min_steps": 5, "max_steps": 6}, {"pool": 3}),
         ):
             assert value(**options) != plain, options
+
+    def test_bfloat16_changes_a_step_little(self, exemplar, monkeypatch):
+        def evolved(setting: str) -> tuple[torch.Tensor, torch.Tensor]:
+            monkeypatch.setenv(VARIABLE, setting)
+            task = ReactionDiffusionTask(CONFIG, exemplar)
+            step = task.loss(1, torch.Generator().manual_seed(0))
+            gradients = torch.autograd.grad(step.value, task.parameters)
+            step.commit()
+            return task.pool, torch.cat([g.flatten() for g in gradients])
+
+        exact, mixed = evolved("0"), evolved("1")
+        assert 0 < (exact[0] - mixed[0]).abs().max() < 0.01
+        assert torch.cosine_similarity(exact[1], mixed[1], dim=0) > 0.99
 
     def test_the_width_of_a_fit_is_that_of_its_texture(self, exemplar):
         texture = reaction_diffusion.fit(exemplar, set=[*SMALL, "width=0.3", "exemplar_size=40"], steps=1)

@@ -15,7 +15,7 @@ from mitex.methods.baselines.reaction_diffusion.config import ReactionDiffusionC
 from mitex.methods.baselines.reaction_diffusion.laplacian import grid_laplacian
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours, geometric_rates
 from mitex.methods.exemplar_pictures import albedo, framed
-from mitex.runtime import keep_freed_memory
+from mitex.runtime import keep_freed_memory, mixed_precision
 from mitex.sparse import LinearMap
 from mitex.training import ParameterTask, Step
 
@@ -49,7 +49,8 @@ class ReactionDiffusionTask(ParameterTask):
         index = int(torch.randint(config.pool, (), generator=generator))
         state = self._start(generator) if step % config.inject_every == 0 else self.pool[index]
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        state = self.reaction.evolve(state, self.laplacian, steps)
+        with mixed_precision():
+            state = self.reaction.evolve(state, self.laplacian, steps)
         # An overflowing state would outweigh all else, by the fourth power of its values.
         picture = self._picture(state.clamp(-1, 1))
         grams = self.network.grams(picture[None], self.targets)
