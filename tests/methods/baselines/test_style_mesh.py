@@ -10,7 +10,7 @@ from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import style_mesh
-from mitex.methods.baselines.style_mesh import StyleMeshConfig, StyleMeshTexture
+from mitex.methods.baselines.style_mesh import StyleMeshConfig, StyleMeshTexture, visible
 from mitex.methods.baselines.style_mesh.layered import (
     fine_energy,
     keep_in_range,
@@ -165,6 +165,18 @@ class TestVisible:
         assert places_in(area, (2, 2)).tolist() == [0, 3]
         assert places_in(torch.zeros(4, 4, dtype=torch.bool), (2, 2)).tolist() == []
 
+    def test_a_window_has_a_margin_and_whole_periods(self):
+        area = torch.zeros(160, 320, dtype=torch.bool)
+        area[50:60, 40], area[70, 200] = True, True
+        share = torch.ones(160, 320)
+        pixels = Counting(share, 2 * share, [area, torch.zeros_like(area)])
+        assert pixels.window() == (slice(32, 96), slice(0, 224))  # 34 to 87 and 24 to 217, rounded outwards
+        within = pixels.within(pixels.window())
+        assert within.share.shape == within.weight.shape == (64, 224) and within.weight.max() == 2
+        assert torch.equal(within.areas[0].nonzero(), area.nonzero() - torch.tensor([32, 0]))
+        everywhere = Counting(share, share, [torch.ones_like(area)])
+        assert everywhere.window() == (slice(0, 160), slice(0, 320))
+
     def test_cameras_are_evenly_around(self):
         cameras = cameras_around(100, 2.5, 60.0, 8)
         np.testing.assert_allclose(np.linalg.norm(cameras.origin, axis=1), 2.5, rtol=1e-6)
@@ -220,6 +232,30 @@ class TestTask:
                         distance += (gram - task.small_targets[layer]).square().mean()
                     total += float(part / sum(parts) * distance)
         assert value == pytest.approx(total, rel=0.02)
+
+    def test_a_network_sees_what_counts_and_little_around_it(self, exemplar, monkeypatch):
+        """A thin bar: fewer pixels, and next to the same distance and gradients as of whole pictures."""
+        bar = icosphere(8)
+        bar = with_layout(bar.with_vertices(bar.vertices * np.array([0.2, 1, 0.2])), 64)
+        deep = {"layers": ("relu1_1", "relu3_1"), "small_layers": ("relu3_1",)}
+        task = StyleMeshTask(replace(CONFIG, views=1, view=128, coarse_first=0.0, **deep), exemplar, bar)
+        task.named["texture0"].data.normal_(0, 0.1, generator=torch.Generator().manual_seed(0))
+        sizes = []
+        read = task.network.read
+        monkeypatch.setattr(task.network, "read", lambda p, taps: sizes.append(p.shape) or read(p, taps))
+
+        def learned() -> tuple[float, torch.Tensor]:
+            value = task.loss(0, torch.Generator()).value
+            return float(value.detach()), torch.autograd.grad(value, task.named["texture0"])[0]
+
+        cropped, gradient = learned()
+        monkeypatch.setattr(visible, "MARGIN", 1000)
+        whole, expected = learned()
+        assert cropped == pytest.approx(whole, rel=2e-3)
+        assert torch.cosine_similarity(gradient.flatten(), expected.flatten(), dim=0) > 0.999
+        half = len(sizes) // 2
+        seen, pixels = (sum(s[1] * s[2] for s in part) for part in (sizes[:half], sizes[half:]))
+        assert seen < 0.6 * pixels
 
     def test_the_exemplar_is_as_large_on_a_finer_texture(self, ball, exemplar):
         """Half as wide as the layout's square, unless texels are asked for."""

@@ -125,7 +125,9 @@ class StyleMeshTask(ParameterTask):
         What is seen frontally and what is seen at a slant have Gram matrices of their own, and only the
         former are compared with the smaller exemplar's, too.
         """
-        picture, _ = self.pictures[k].picture(texture, self._camera(view, k))
+        window = pixels.window()
+        pixels = pixels.within(window)
+        picture = self.pictures[k].picture(texture, self._camera(view, k))[0][window]
         if picture.requires_grad:
             picture.register_hook(lambda gradient: gradient * pixels.weight[..., None])
         taps, wanted = {}, {}

@@ -15,6 +15,11 @@ from mitex.mesh import Mesh
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.stage import Stage
 
+MARGIN = 16  # at least, around what counts, of what a network sees [px]
+PERIOD = (
+    32  # of windows [px]: a multiple of 16, the pixels under one of relu5_1; larger, so that few sizes differ
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Visible:
@@ -76,6 +81,22 @@ class Counting:
         cosine = torch.from_numpy(visible.cosine.astype(np.float32))
         facing = cosine > math.cos(math.radians(frontal))
         return Counting(own, own * cosine, [seen & facing, seen & ~facing])
+
+    def window(self) -> tuple[slice, slice]:
+        """Rows and columns that a network has to see: of pixels that count, at least one, and a margin."""
+        seen = torch.stack(list(self.areas)).any(0)
+        return _window(seen.any(1)), _window(seen.any(0))
+
+    def within(self, window: tuple[slice, slice]) -> Counting:
+        """Of that part of the picture."""
+        return Counting(self.share[window], self.weight[window], [area[window] for area in self.areas])
+
+
+def _window(seen: torch.Tensor) -> slice:
+    """From the first to the last of places (n,) that are seen, and `MARGIN` more, in whole periods."""
+    places = seen.nonzero()[:, 0]
+    first, last = int(places[0]) - MARGIN, int(places[-1]) + 1 + MARGIN
+    return slice(max(first // PERIOD * PERIOD, 0), min(-(-last // PERIOD) * PERIOD, len(seen)))
 
 
 def places_in(area: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
