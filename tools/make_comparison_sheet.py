@@ -7,6 +7,8 @@ of likeness and of costs: the means over all pairs, those of each exemplar, and 
 standard deviation over seeds where there are several. Where values lie on both sides of the best one, the
 mean of their distances from it stands in brackets: in their own mean, opposite errors cancel. The sheet has a
 row for each exemplar: itself, and a mesh by each method; with several meshes, the rows take them in turn.
+With `--pairs`, the likeness of each single pair goes to docs/results/comparison-pairs.csv, in place of what
+the file had of that pair, method and seed.
 """
 
 from __future__ import annotations
@@ -29,6 +31,8 @@ from mitex.images import read_image, write_image
 from mitex.render import sheet
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
+PAIRS = Path(__file__).parents[1] / "docs" / "results" / "comparison-pairs.csv"
+IDENTITY = ("exemplar", "mesh", "method", "seed")
 CELL = 240  # side of a picture [px]
 Row = dict[str, str]
 
@@ -90,6 +94,24 @@ def _grouped(rows: Sequence[Row], key: str) -> list[tuple[str, Sequence[Row]]]:
     return [(name, [row for row in rows if row[key] == value]) for value, name in names.items()]
 
 
+def keep_pairs(rows: Sequence[Row]) -> None:
+    """Writes rows to the file of pairs, whose other rows stay; sorted, numbers with four digits."""
+    kept = {}
+    if PAIRS.is_file():
+        with PAIRS.open(encoding="utf-8", newline="") as file:
+            kept = {tuple(row[key] for key in IDENTITY): row for row in csv.DictReader(file)}
+    keys, names = [measure.key for measure in LOOKS], labels(row["mesh"] for row in rows)
+    for row in rows:
+        own = {"exemplar": row["exemplar"], "mesh": names[row["mesh"]], "method": row["method"]}
+        numbers = {key: f"{float(row[key]):.4g}" if row[key] else "" for key in keys}
+        pair = own | {"seed": row["seed"]} | numbers
+        kept[tuple(pair[key] for key in IDENTITY)] = pair
+    with PAIRS.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, [*IDENTITY, *keys], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(kept[identity] for identity in sorted(kept))
+
+
 def pictures(
     rows: Sequence[Row], exemplars: Sequence[str], methods: Sequence[str], meshes: Sequence[str]
 ) -> np.ndarray:
@@ -107,6 +129,7 @@ def main() -> None:
     parser.add_argument("--mesh", default=["vase"], nargs="+", help="that the sheet shows, row by row")
     parser.add_argument("--sheet", default="comparison.jpg", help="its name in the gallery")
     parser.add_argument("--methods", nargs="+", required=True, help="of tables and sheet, in this order")
+    parser.add_argument("--pairs", action="store_true", help="keep the numbers of each pair, too")
     parser.add_argument("folders", nargs="+", type=Path)
     arguments = parser.parse_args()
     rows = [row for folder in arguments.folders for row in rows_of(folder)]
@@ -114,6 +137,8 @@ def main() -> None:
     groups = [("all", rows), *_grouped(rows, "exemplar"), *_grouped(rows, "mesh")]
     for measures in (LOOKS, COSTS):
         print(table(groups, arguments.methods, measures), end="\n\n")
+    if arguments.pairs:
+        keep_pairs(rows)
     path = GALLERY / arguments.sheet
     write_image(path, pictures(rows, exemplars, arguments.methods, arguments.mesh))
     print(path)

@@ -19,6 +19,7 @@ def script(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
     script = import_module("make_comparison_sheet")
     monkeypatch.setattr(script, "GALLERY", tmp_path)
+    monkeypatch.setattr(script, "PAIRS", tmp_path / "pairs.csv")
     return script
 
 
@@ -74,3 +75,20 @@ def test_likeness_and_costs(script, tmp_path, monkeypatch, capsys):
     assert lines(spent)["lava"] == ["1,200,000", "40.0 ± 14", "–", "1.50"]
     assert lines(spent)["vase"][1] == "45.0 ± 7.1"
     assert read_image(tmp_path / "comparison.jpg").shape[2] == 3
+
+
+def test_numbers_of_pairs_are_kept(script, tmp_path, monkeypatch):
+    """A later run replaces its own pairs, and no others."""
+    first = {(mesh, 0): {"gram": value} for mesh, value in (("vase", 1.0), ("ball", 2.0))}
+    for name, numbers, pairs in (
+        ("a", first, ["--pairs"]),
+        ("b", {("vase", 0): {"gram": 3.14159}, ("vase", 1): {"gram": 5.0}}, ["--pairs"]),
+        ("c", {("vase", 0): {"gram": 7.0}}, []),
+    ):
+        folder = comparison(tmp_path / name, "lava", numbers)
+        options = ["--methods", "a", "--mesh", "vase", *pairs, "--", folder]
+        monkeypatch.setattr(sys, "argv", ["make_comparison_sheet.py", *options])
+        script.main()
+    with (tmp_path / "pairs.csv").open(newline="") as file:
+        rows = [(row["mesh"], row["seed"], row["gram"], row["transport"]) for row in csv.DictReader(file)]
+    assert rows == [("ball", "0", "2", ""), ("vase", "0", "3.142", ""), ("vase", "1", "5", "")]
