@@ -16,9 +16,7 @@ from mitex.scenes.cameras import Cameras
 from mitex.scenes.stage import Stage
 
 MARGIN = 16  # at least, around what counts, of what a network sees [px]
-PERIOD = (
-    32  # of windows [px]: a multiple of 16, the pixels under one of relu5_1; larger, so that few sizes differ
-)
+PERIOD = 32  # of windows [px]: a multiple of 16, of which relu5_1 makes one place; twice it, for fewer sizes
 
 
 @dataclass(frozen=True, eq=False)

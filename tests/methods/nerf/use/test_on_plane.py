@@ -30,8 +30,9 @@ def test_elevations_compare_what_photos_show(texture, monkeypatch):
         assert np.allclose((row.ours, *row.flat.values()), row_distances.mean(0), rtol=1e-3)
         assert list(row.flat) == list(FLAT)
         assert (row_distances[0] != row_distances[1]).all()  # the second synthesis is another one
-        # Every option shows; of so few patches, an even quilt may be that of before in one of the syntheses.
-        assert max(len({captured, others, *one}) for one in row_distances) == count + 2
+        # Every option shows, but of few patches an even quilt may be the plain one in one synthesis's window.
+        values = [len({captured, others, *one}) for one in row_distances]
+        assert max(values) == count + 2 and min(values) >= count + 1
         assert row.captured < row.ours or row.angle > 40
         assert row.picture.shape == (4 * 64, 64, 3)
     for k, (mask, photo) in enumerate(masks):
