@@ -35,7 +35,7 @@ class Fit(DeviceOptions):
 
     examples:
       mitex fit geometric --reference spikes
-      mitex fit geometric --reference craters --preset fine
+      mitex fit geometric --reference craters --preset finest
       mitex fit geometric --reference cactus.obj --out runs/cactus
       mitex fit geometric --reference bricks --field about-y --preset finest --set symmetric=true
       mitex fit geometric --reference ring.obj --template coarse-ring.obj --preset paper
@@ -50,7 +50,7 @@ class Fit(DeviceOptions):
         PlainText | None, arg(metavar="fast|paper|fine|finest", help_behavior_hint="(default: fast)")
     ] = None
     """Settings to start from: `fast`; `paper`, which follows the publication; `fine`, for features too small
-    for the coarse levels, such as craters and ridges; or `finest`, for strands, bricks and shingles."""
+    for the coarse levels, such as knobs and ridges; or `finest`, for craters, strands, bricks and shingles."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""

@@ -254,7 +254,7 @@ def test_resuming_changes_nothing(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("name", "levels", "faces"),
-    [("spikes", 5, 5120), ("scales", 1, 20480), ("knobs", 2, 20480), ("craters", 2, 20480)],
+    [("spikes", 5, 5120), ("scales", 1, 20480), ("knobs", 2, 20480), ("craters", 1, 20480)],
 )
 def test_bundled_models_are_found_by_name(name, levels, faces):
     """Without noise they rebuild their reference, about as near as the mesh that they were trained with;
