@@ -50,7 +50,7 @@ class Fit(DeviceOptions):
         PlainText | None, arg(metavar="fast|paper|fine|finest", help_behavior_hint="(default: fast)")
     ] = None
     """Settings to start from: `fast`; `paper`, which follows the publication; `fine`, for features too small
-    for the coarse levels, such as knobs and ridges; or `finest`, for craters, strands, bricks and shingles."""
+    for coarse levels, such as knobs and ridges; or `finest`, for craters, strands, bricks and shingles."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""
