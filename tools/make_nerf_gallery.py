@@ -4,7 +4,8 @@ repetition: python tools/make_nerf_gallery.py RUNS CAPTURES MESHES SHEET NAME[,N
 
 RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos, MESHES is a folder; meshes
 are named as for make_surface_gallery.py. docs/gallery/SHEET.jpg has a row for each texture: a photo that was
-held out, the same view of the field, the synthesized texture as a plane at three elevations, and the meshes.
+held out, the same view of the field, the texture synthesized as a plane, at three elevations, and the meshes,
+on which patches are joined.
 The quality of all held-out views is printed.
 """
 
@@ -71,7 +72,7 @@ def main() -> None:
         labels += [f"from {elevation} degrees" for elevation in ELEVATIONS]
         for mesh in targets:
             start = time.perf_counter()
-            cells.append(picture(texture.apply(find_mesh(mesh, Path(meshes)), maps), 18))
+            cells.append(picture(texture.apply(find_mesh(mesh, Path(meshes))), 18))
             labels.append(mesh.split("~")[0])
             print(f"{texture_name} on {mesh}: {time.perf_counter() - start:.0f} s", flush=True)
     columns = 2 + len(ELEVATIONS) + len(targets)
