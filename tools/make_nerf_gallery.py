@@ -60,7 +60,9 @@ def main() -> None:
     for texture_name in textures.split(","):
         texture = NerfTexture.load(Path(runs) / texture_name)
         _, held_out = load_capture(Path(captures) / texture_name).within(texture.similarity).split()
-        print(f"{texture_name}: {view_quality(render_views(texture.shell, held_out))}", flush=True)
+        for across in (1, 2):
+            quality = view_quality(render_views(texture.shell, held_out, across=across))
+            print(f"{texture_name}, {across} x {across} rays a pixel: {quality}", flush=True)
         image, photo = render_view(texture.shell, held_out, 0)
         start = time.perf_counter()
         maps = texture.synthesize(1024, seed=0, tileable=True)

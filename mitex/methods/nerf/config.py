@@ -18,7 +18,8 @@ class RadianceConfig(TrainingConfig):
     rays: int = key(4096, "rays in a step", 1, 1 << 20)
     rays_across: int = key(
         1,
-        "a pixel is compared with the mean of so many by so many rays; 1: one, through its centre",
+        "a pixel is compared with the mean of so many by so many rays, from lr_steps / 2 on; 1: with one, "
+        "through its centre",
         1,
         8,
     )

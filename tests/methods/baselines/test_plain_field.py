@@ -192,7 +192,6 @@ def test_refusals(ball):
         "rays=512",
         "one_view=true",
         "colour_loss=l2",
-        "rays_across=2",
         "ray_steps=96",
         "distortion=1",
         "occupancy=24",

@@ -76,7 +76,7 @@ def render_view(
 
 
 def render_views(
-    field: RadianceField, capture: Capture, longest: int = LONGEST
+    field: RadianceField, capture: Capture, longest: int = LONGEST, across: int = 1
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """`render_view` of all views, one after another."""
-    return (render_view(field, capture, view, longest) for view in range(len(capture)))
+    return (render_view(field, capture, view, longest, across) for view in range(len(capture)))

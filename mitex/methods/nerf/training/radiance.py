@@ -99,7 +99,7 @@ class RadianceTask(ABC, Generic[Config]):
         Raises:
             ConfigError: nothing is left of the field.
         """
-        batch = self.with_cameras(self._draw(generator))
+        batch = self.with_cameras(self._draw(step, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
         samples = march(*rays, self.occupancy.mask, self.step_length, upload(mi.Float, jitter.numpy()))
@@ -147,9 +147,18 @@ class RadianceTask(ABC, Generic[Config]):
             return differences.abs()
         return L2_WEIGHT * differences.square()
 
-    def _draw(self, generator: torch.Generator) -> Batch:
+    def is_late(self, step: int) -> bool:
+        """Whether the learning rate has gone half of its way to a tenth.
+
+        `steps` has no say, or a run that goes on for more steps would not be that of one go.
+        """
+        return 2 * step >= self.config.lr_steps
+
+    def _draw(self, step: int, generator: torch.Generator) -> Batch:
+        """Rays of a step: early single ones, since many pixels teach more than pixels that are exact."""
         config = self.config
-        return self.pixels.draw(config.rays, config.one_view, generator, config.rays_across)
+        across = config.rays_across if self.is_late(step) else 1
+        return self.pixels.draw(config.rays, config.one_view, generator, across)
 
     def _average(self) -> None:
         """Every `REFRESH` updates the mean parameters move towards the current ones."""

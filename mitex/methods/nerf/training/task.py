@@ -253,11 +253,8 @@ class TextureTask(RadianceTask[NerfConfig]):
         return 1 - dr.exp(-dr.exp(lowest) * step)
 
     def _uses_interior(self, step: int) -> bool:
-        """Only late: colours learn slower beside a loss that wants them the same at all depths.
-
-        `steps` has no say, or a run that goes on for more steps would not be that of one go.
-        """
-        return self.config.interior_weight > 0 and 2 * step >= self.config.lr_steps
+        """Only late: colours learn slower beside a loss that wants them the same at all depths."""
+        return self.config.interior_weight > 0 and self.is_late(step)
 
     def _slope(self, arrays: Sequence[mi.TensorXf], coords: ShellCoords) -> mi.Vector3f:
         """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""

@@ -54,7 +54,6 @@ def plain() -> np.ndarray:
     "change",
     [
         "one_view=true",
-        "rays_across=2",
         "colour_loss=l2",
         "cluster_entries=16",
         "normal_rays=0.5",
@@ -186,6 +185,7 @@ TESTED_ELSEWHERE = {
     "checkpoint_every": "tests/training",
     "preview_every": "tests/training",
     "interior_weight": "tests/methods/nerf/test_fitting.py",
+    "rays_across": "tests/methods/nerf/training/test_rays_across.py",
     "refine_cameras": "tests/methods/nerf/test_fitting.py",
     **dict.fromkeys(
         ("neighbours", "repulsion", "concavity", "base_steps", "lr", "lr_steps", "average"), __name__
