@@ -1,6 +1,6 @@
 """Compares captured textures with what the paper compares them with: tables, and sheets of pictures.
 
-repetition: python tools/compare_nerf.py RUNS CAPTURES NAME ...
+usage: python tools/compare_nerf.py RUNS CAPTURES NAME ...
 
 RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos. Held-out views are compared
 with those of a plain field, trained for the same time into RUNS/plain-NAME (docs/gallery/nerf-views.jpg), and

@@ -1,6 +1,6 @@
 """Compares textures joined on a mesh with such that are laid over its UVs: seams, and close-ups.
 
-repetition: python tools/compare_quilting.py RUNS MESHES SHEET NAME[,NAME...] MESH ...
+usage: python tools/compare_quilting.py RUNS MESHES SHEET NAME[,NAME...] MESH ...
 
 RUNS holds a finished run of `mitex fit nerf` for each NAME; meshes are named as for make_surface_gallery.py.
 docs/gallery/SHEET.jpg has a row for each texture and mesh: laid over the UVs and joined on the surface, whole

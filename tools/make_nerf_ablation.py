@@ -1,6 +1,6 @@
 """Shows what the clustering loss does (section 4.5, figure 11).
 
-repetition: python tools/make_nerf_ablation.py RUN CAPTURE WITHOUT
+usage: python tools/make_nerf_ablation.py RUN CAPTURE WITHOUT
 
 RUN and WITHOUT are finished runs of `mitex fit nerf` on CAPTURE, the second one with `--set clustering=0`.
 docs/gallery/nerf-clustering.jpg has a row for each: the first three principal components of synthesized

@@ -1,6 +1,6 @@
 """Shows captured textures: views, what is synthesized, and other shapes that wear them.
 
-repetition: python tools/make_nerf_gallery.py RUNS CAPTURES MESHES SHEET NAME[,NAME...] MESH ...
+usage: python tools/make_nerf_gallery.py RUNS CAPTURES MESHES SHEET NAME[,NAME...] MESH ...
 
 RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos, MESHES is a folder; meshes
 are named as for make_surface_gallery.py. docs/gallery/SHEET.jpg has a row for each texture: a photo that was
