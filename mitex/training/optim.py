@@ -2,10 +2,12 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
 import torch
+
+PART = 1 << 18  # elements that are updated together on a CPU, so that they stay in its cache
 
 
 class Optimizer(Protocol):
@@ -67,14 +69,15 @@ class Adam:
             if p.grad is None:
                 continue
             self.counts[i] += 1
-            m, v, n = self.first[i], self.second[i], self.counts[i]
-            m.lerp_(p.grad, 1 - b1)
+            n, second = self.counts[i], self.second[i]
             if self.shared:
-                v.mul_(b2).add_(p.grad.square().mean(), alpha=1 - b2)
-            else:
-                v.mul_(b2).addcmul_(p.grad, p.grad, value=1 - b2)
-            denominator = (v.sqrt() / math.sqrt(1 - b2**n)).add_(self.eps)
-            p.addcdiv_(m, denominator.expand_as(p), value=-lr / (1 - b1**n))
+                second.mul_(b2).add_(p.grad.square().mean(), alpha=1 - b2)
+            for values, gradient, m, v in _parts(p, p.grad, self.first[i], second.expand_as(p)):
+                m.lerp_(gradient, 1 - b1)
+                if not self.shared:
+                    v.mul_(b2).addcmul_(gradient, gradient, value=1 - b2)
+                denominator = (v.sqrt() / math.sqrt(1 - b2**n)).add_(self.eps)
+                values.addcdiv_(m, denominator, value=-lr / (1 - b1**n))
 
     def clear(self) -> None:
         """Drops all gradients."""
@@ -98,6 +101,15 @@ class Adam:
             raise ValueError(f"{(len(state) - 1) // 2} parameters instead of {len(self.parameters)}")
         copy_state(state, own)
         self.counts = own["counts"].tolist()
+
+
+def _parts(*tensors: torch.Tensor) -> Iterable[tuple[torch.Tensor, ...]]:
+    """Tensors of one shape, in parts of `PART` elements along the first axis; whole on a graphics card."""
+    first = tensors[0]
+    if first.numel() <= PART or not first.is_cpu:
+        return [tensors]
+    length = max(PART * len(first) // first.numel(), 1)
+    return zip(*(tensor.split(length) for tensor in tensors), strict=True)
 
 
 def copy_state(state: dict[str, torch.Tensor], own: dict[str, torch.Tensor]) -> None:

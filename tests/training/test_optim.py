@@ -5,6 +5,7 @@ import math
 import pytest
 import torch
 
+from mitex.training import optim
 from mitex.training.optim import Adam, gradient_norms, multistep, normalise_gradients
 
 
@@ -27,6 +28,21 @@ def test_adam_is_bit_equal_to_torchs():
         adam.step(schedule(step))
         reference.step()
         assert all(torch.equal(p, q) for p, q in zip(ours, theirs, strict=True)), step
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("shape", [(100, 3), (3, 100), (300,)])
+def test_adam_in_parts_is_adam(monkeypatch, shape, shared):
+    one, two = (torch.nn.Parameter(torch.ones(shape)) for _ in range(2))
+    whole, parts = Adam([one], shared=shared), Adam([two], shared=shared)
+    generator = torch.Generator().manual_seed(2)
+    for _ in range(3):
+        one.grad = two.grad = torch.randn(shape[::-1], generator=generator).permute(*range(len(shape))[::-1])
+        whole.step(0.1)
+        with monkeypatch.context() as patch:
+            patch.setattr(optim, "PART", 64)
+            parts.step(0.1)
+    assert torch.equal(one, two)
 
 
 def test_adam_first_step_moves_by_the_learning_rate():

@@ -7,6 +7,7 @@ import pytest
 import torch
 from torch.autograd import gradcheck
 
+from mitex.methods.nerf.training import losses
 from mitex.methods.nerf.training.losses import clustering, distortion, normal_agreement
 
 FREE = math.cos(math.pi / 8)
@@ -55,6 +56,16 @@ def test_clustering_has_the_gradient_of_a_constant_p(kappa):
         expected = torch.autograd.grad(loss, (features, centres), retain_graph=True)
         same = [torch.allclose(a, b, rtol=1e-10, atol=0) for a, b in zip(gradients, expected, strict=True)]
         assert same == [not attached] * 2
+
+
+def test_clustering_is_the_same_in_parts(monkeypatch):
+    features, centres = _normal(23, 2).requires_grad_(), _normal(4, 2, seed=1).requires_grad_()
+    whole = clustering(features, centres)
+    monkeypatch.setattr(losses, "PART", 5)
+    parts = clustering(features, centres)
+    torch.testing.assert_close(parts, whole, rtol=1e-12, atol=0)
+    for a, b in zip(*(torch.autograd.grad(x, (features, centres)) for x in (whole, parts)), strict=True):
+        torch.testing.assert_close(a, b, rtol=1e-10, atol=0)
 
 
 def test_clustering_scales_with_the_gradient_that_comes_in():
