@@ -18,7 +18,7 @@ A = TypeVar("A", bound=dr.ArrayBase)
 DIAGONAL = 2 * math.sqrt(3)  # of the scene cube [-1, 1]^3
 WINDOW = 48  # steps that are taken before the rays that have come to an end are dropped
 OPAQUE = 1e-3  # transmittance of a ray that has come to an end
-FRONT = 12  # samples of a ray that are evaluated first: most rays end in them
+FRONT = 16  # samples of a ray that are evaluated first, then as many again, and twice as many each time
 
 
 @dataclass
@@ -213,12 +213,15 @@ def visible(
     """
     depth = dr.zeros(mi.Float, len(samples))
     rank = dr.arange(mi.UInt32, len(samples)) - _first(samples)
-    for part in (rank < FRONT, rank >= FRONT):
-        transmittance = dr.exp(-sum_rays(depth, samples))
-        index = mi.UInt32(dr.compress(part & (dr.gather(mi.Float, transmittance, samples.ray) > OPAQUE)))
-        if dr.width(index):
-            points = samples.subset(index).points(origin, direction)
-            dr.scatter(depth, density(points) * samples.length, index)
+    dr.eval(rank)
+    end, part = FRONT, rank < dr.opaque(mi.UInt32, FRONT)
+    while dr.width(index := mi.UInt32(dr.compress(part))):
+        points = samples.subset(index).points(origin, direction)
+        dr.scatter(depth, density(points) * samples.length, index)
+        transmittance = dr.gather(mi.Float, dr.exp(-sum_rays(depth, samples)), samples.ray)
+        first, end = end, 2 * end
+        part = (rank >= dr.opaque(mi.UInt32, first)) & (rank < dr.opaque(mi.UInt32, end))
+        part &= transmittance > OPAQUE
     before = sum_before(mi.Float64(depth), samples)
     return samples.subset(mi.UInt32(dr.compress(dr.exp(-before) > OPAQUE)))
 

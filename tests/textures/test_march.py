@@ -10,7 +10,7 @@ import pytest
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
-from mitex.textures.march import OPAQUE, Samples, composite, march, sum_rays, visible, weights_of
+from mitex.textures.march import FRONT, OPAQUE, Samples, composite, march, sum_rays, visible, weights_of
 
 init()
 
@@ -156,13 +156,13 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
     """Rays that end in their first samples, far behind these, or never; against loops."""
     origin, direction, jitter = rays(3)
     full = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))
-    samples = march(origin, direction, full, 1 / 32, jitter)
+    samples = march(origin, direction, full, 1 / 128, jitter)
     looked_at = []
 
     def dense(points):
         looked_at.append(dr.width(points))
         starts = dr.select(points.y < -0.1, -0.9, dr.select(points.y < 0.1, 0.4, 9.0))
-        return mi.Float(dr.select(points.x > starts, 60.0, 0.5))
+        return mi.Float(dr.select(points.x > starts, 240.0, 0.5))
 
     visible_samples = visible(samples, origin, direction, dense)
     ray, t = np.array(samples.ray), np.array(samples.t)
@@ -171,11 +171,12 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
     for k in range(len(ray)):
         if transmittance[ray[k]] > OPAQUE:
             expected.append((ray[k], t[k]))
-        transmittance[ray[k]] *= math.exp(-density[k] / 32)
+        transmittance[ray[k]] *= math.exp(-density[k] / 128)
     pixels = np.stack([np.array(visible_samples.ray), np.array(visible_samples.t)], axis=1)
     np.testing.assert_array_equal(pixels, np.array(expected, np.float32))
     assert len(pixels) < 0.7 * len(ray)
     assert sum(looked_at[:-1]) < 0.75 * len(ray)  # the first ray's end is not looked at
+    assert sum(looked_at[:-1]) <= np.maximum(FRONT, 2 * np.bincount(pixels[:, 0].astype(int))).sum()
 
 
 def test_rays_gather_the_same_of_what_is_visible():
