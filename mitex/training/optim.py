@@ -7,7 +7,7 @@ from typing import Protocol
 
 import torch
 
-PART = 1 << 18  # elements that are updated together on a CPU, so that they stay in its cache
+PART = 1 << 20  # elements that are updated together on a CPU: smaller parts wake its threads too often
 
 
 class Optimizer(Protocol):
