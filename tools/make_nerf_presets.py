@@ -9,7 +9,6 @@ held out and the same view of both, whole and near by. The quality of all held-o
 from __future__ import annotations
 
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,10 @@ from make_nerf_gallery import GALLERY
 from mitex.evaluation.views import view_quality
 from mitex.images import write_image
 from mitex.methods.nerf import NerfTexture, load_capture
+from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.field.rendering import render_views
 from mitex.render import sheet
+from mitex.training.config import resolve
 
 CELL = 400  # side of a picture [px]
 VIEW = 2  # the held-out photo that is shown
@@ -45,7 +46,7 @@ def main() -> None:
             print(f"{run.name}, {across} x {across} rays a pixel: {view_quality(views)}", flush=True)
         view, photo = views[VIEW]
         cells += [view] if cells else [photo, view]
-        labels.append(tomllib.loads((run / "config.toml").read_text())["preset"])
+        labels.append(resolve(PRESETS, file=run / "config.toml").preset)
     write_image(
         GALLERY / "nerf-presets.jpg",
         sheet(cells + [near(cell) for cell in cells], columns=3, labels=labels + ["near by"] * 3, cell=CELL),

@@ -76,8 +76,8 @@ def normal_agreement(predicted: torch.Tensor, target: torch.Tensor) -> torch.Ten
 class _Clustering(torch.autograd.Function):
     """The loss and its derivative in closed form, a part of the entries at a time.
 
-    Autograd takes six times as long. In float64: the features start within 1e-4, and P and Q are then equal
-    to float32's precision.
+    Autograd takes three times as long for a whole table. In float64: the features start within 1e-4, and P
+    and Q are then equal to float32's precision.
     """
 
     @staticmethod
